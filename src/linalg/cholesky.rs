@@ -7,12 +7,14 @@ use super::vector::{add_scaled, dot};
 
 /// Rows eliminated together: each row below is then loaded and stored a quarter as often.
 const BLOCK: usize = 4;
+/// Bound on products of pivots whose logarithm is taken at once.
+const SAFE_PRODUCT: f64 = 1e150;
 
 /// Replaces `A` by `U`. Returns the logarithm of A's determinant, or `None` if A is not positive definite to working
 /// precision.
 #[inline(always)]
 pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
-    let mut log_det = 0.0;
+    let (mut log_det, mut determinant) = (0.0, 1.0);
     for first in (0..n).step_by(BLOCK) {
         let end = (first + BLOCK).min(n);
         for k in first..end {
@@ -25,7 +27,13 @@ pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
             if !(pivot > 0.0 && pivot.is_finite()) {
                 return None;
             }
-            log_det += libm::log(pivot);
+            // One logarithm for many pivots, as long as their product is far from overflow.
+            let product = determinant * pivot;
+            let is_normal = (SAFE_PRODUCT.recip()..SAFE_PRODUCT).contains(&product);
+            if !is_normal {
+                log_det += libm::log(determinant);
+            }
+            determinant = if is_normal { product } else { pivot };
             let inverse = pivot.sqrt().recip();
             let row = a[k * n + k..k * n + n].iter_mut();
             row.for_each(|u| *u *= inverse);
@@ -43,7 +51,7 @@ pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
             }
         }
     }
-    Some(log_det)
+    Some(log_det + libm::log(determinant))
 }
 
 /// Returns the factor of `A + ridge · I` and the logarithm of its determinant. The ridge grows until the sum is positive

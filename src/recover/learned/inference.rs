@@ -45,21 +45,40 @@ impl LearnedModel {
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> FloatTile {
+        let equations = self.equations(measurements, pattern_indices, rect);
+        let means = PosteriorMeans::new(&equations, rect, &self.prior, &self.min_brightness);
+        self.coefficients(&means, rect, self.neighbour_prior.as_ref())
+    }
+
+    /// The equations of a tile and its halo.
+    fn equations(
+        &self,
+        measurements: &Measurements,
+        pattern_indices: &[usize],
+        rect: TileRect,
+    ) -> ObservationEquations {
         let region = with_margin(measurements, rect, self.halo());
         let (geometry, basis) = (&self.geometry, &self.basis);
-        let equations =
-            ObservationEquations::new(measurements, geometry, basis, pattern_indices, region);
-        let means = PosteriorMeans::new(&equations, rect, &self.prior, &self.min_brightness);
-        let rank = basis.rank();
+        ObservationEquations::new(measurements, geometry, basis, pattern_indices, region)
+    }
+
+    /// The coefficients of a tile, with the neighbour prior if one is given.
+    fn coefficients(
+        &self,
+        means: &PosteriorMeans<'_>,
+        rect: TileRect,
+        neighbour_prior: Option<&NeighbourPrior>,
+    ) -> FloatTile {
+        let rank = self.basis.rank();
         let mut coefficients = vec![[0.0f32; CHANNELS]; rect.extent.area() * rank];
         vectorise(
             #[inline(always)]
             || {
                 let mut solver = PosteriorSolver::new(rank);
                 for (i, location) in means.interior_locations().enumerate() {
-                    let brightness = equations.observations[location.index].brightness;
+                    let brightness = means.equations.observations[location.index].brightness;
                     let pixel = &mut coefficients[i / CHANNELS * rank..][..rank];
-                    let z = self.estimate(&means, location, &mut solver);
+                    let z = self.estimate(means, location, neighbour_prior, &mut solver);
                     for (coefficient, z) in pixel.iter_mut().zip(z) {
                         coefficient[location.channel] = (brightness * z) as f32;
                     }
@@ -78,6 +97,7 @@ impl LearnedModel {
         &self,
         means: &PosteriorMeans<'_>,
         location: PixelObservationPosition,
+        neighbour_prior: Option<&NeighbourPrior>,
         solver: &mut PosteriorSolver,
     ) -> Vec<f64> {
         let index = location.index;
@@ -85,7 +105,7 @@ impl LearnedModel {
         if !means.is_reliable[index] {
             return estimate;
         }
-        if let Some(prior) = &self.neighbour_prior {
+        if let Some(prior) = neighbour_prior {
             let (q, _) = prior.infer(means, self.prior.noise_factor, location, solver);
             for (estimate, z) in estimate.iter_mut().zip(&solver.mean) {
                 *estimate = q * z + (1.0 - q) * *estimate;
@@ -101,18 +121,25 @@ impl LearnedModel {
         tile.functions(&self.geometry, Some(&self.basis.functions))
     }
 
-    /// Squared residual, over `rect`, of the held-out patterns as predicted from the others. Saturated samples do not
-    /// count.
-    pub fn held_out_error(
+    /// Squared residual, over `rect`, of the held-out patterns as predicted from the others: by the pixel prior, and by
+    /// the neighbour prior. Saturated samples do not count.
+    pub fn held_out_errors(
         &self,
         measurements: &Measurements,
         split: &HoldoutSplit,
         rect: TileRect,
-    ) -> f64 {
-        let functions = self.expand(&self.tile(measurements, &split.training, rect));
-        let residuals =
-            prediction::residuals(&self.geometry, measurements, &split.held_out, &functions);
-        let finite = residuals.iter().filter(|residual| residual.is_finite());
-        finite.map(|residual| residual * residual).sum()
+    ) -> [f64; 2] {
+        let equations = self.equations(measurements, &split.training, rect);
+        let means = PosteriorMeans::new(&equations, rect, &self.prior, &self.min_brightness);
+        let error = |neighbour_prior| {
+            let functions = self.expand(&self.coefficients(&means, rect, neighbour_prior));
+            let residuals =
+                prediction::residuals(&self.geometry, measurements, &split.held_out, &functions);
+            let finite = residuals.iter().filter(|residual| residual.is_finite());
+            finite.map(|residual| residual * residual).sum()
+        };
+        let without = error(None);
+        let with = self.neighbour_prior.as_ref();
+        [without, with.map_or(without, |prior| error(Some(prior)))]
     }
 }

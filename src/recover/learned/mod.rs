@@ -79,18 +79,16 @@ impl LearnedRecovery {
         let mut model = preparation.fit_basis(mean_function)?;
         executor.check_cancelled()?;
         let regions = preparation.training_regions(model.basis.rank());
-        preparation.fit_neighbour_prior(&mut model, &split.training, &regions);
+        preparation.fit_priors(&mut model, &split.training, &regions, true);
         let mut nnls = None;
         if !split.held_out.is_empty() {
-            let helps = preparation.select_neighbour_prior(&mut model, &regions);
+            preparation.select_neighbour_prior(&mut model, &regions);
             executor.check_cancelled()?;
             nnls = fit_nnls_alternative(&model, preparation, &regions)?;
             // All choices are made: train on the held-out patterns, too.
             executor.check_cancelled()?;
-            preparation.fit_neighbour_prior(&mut model, &split.all, &regions);
-            if !helps {
-                model.neighbour_prior = None;
-            }
+            let helps = model.neighbour_prior.is_some();
+            preparation.fit_priors(&mut model, &split.all, &regions, helps);
         }
         Ok(Self { model, nnls })
     }

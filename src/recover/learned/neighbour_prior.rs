@@ -25,14 +25,16 @@ use serde::{Deserialize, Serialize};
 
 use super::equations::PHASES;
 use super::neighbour_regression::{RegressionSums, add_products, solve_regressions};
-use super::posterior::{PosteriorSolver, PriorPrecision};
+use super::posterior::{PosteriorSolver, PriorPrecision, SecondMoment};
 use super::posterior_means::{PREDICTORS, PixelObservationPosition, PosteriorMeans};
 use super::prior::Prior;
 use crate::job_executor::Executor;
 use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::CHANNELS;
 
+/// EM iterations from the first estimate, and from a prior that was learned from most of the same measurements.
 const EM_ITERATIONS: usize = 4;
+const EM_ITERATIONS_WARM: usize = 2;
 /// Groups of regions that sums are formed over. Fixed, so that results do not depend on the executor.
 const PARTS: usize = 8;
 /// Share of the pixel posterior's variance in the first estimate of C, and the observations, one in so many, whose
@@ -67,18 +69,20 @@ pub(super) struct NeighbourPrior {
 struct NeighbourStatistics {
     /// Σ z_jk ẑ_k by class, `[predictor, r]`.
     right_hand_sides: Vec<Vec<f64>>,
-    /// Σ q ((ẑ − m)(ẑ − m)ᵀ + P), upper triangle.
-    second_moment: Vec<f64>,
+    /// Σ q ((ẑ − m)(ẑ − m)ᵀ + P).
+    second_moment: SecondMoment,
     /// Σ q.
     responsibility: f64,
     count: f64,
 }
 
 impl NeighbourPrior {
-    /// Learns from the bright observations in the interiors of `regions`; `None` if they are too few.
+    /// Learns from the bright observations in the interiors of `regions`, starting from `start` if there is one; `None`
+    /// if they are too few.
     pub fn learn(
         regions: &[PosteriorMeans<'_>],
         prior: &Prior,
+        start: Option<Self>,
         executor: &impl Executor,
     ) -> Option<Self> {
         let rank = prior.rank;
@@ -111,20 +115,26 @@ impl NeighbourPrior {
             let solve = |i: usize| solve_regressions(&factors[i], &right_hand_sides[i], rank);
             executor.map(CLASSES, solve)
         };
-        let sides: Vec<Vec<f64>> = sums.into_iter().map(|s| s.right_hand_side).collect();
-        let mut learned = Self {
-            rank,
-            weights: solve(&sides),
-            precision: prior.precision.clone(),
-            mixing_share: 0.5,
+        let (mut learned, iterations) = match start {
+            Some(start) => (start, EM_ITERATIONS_WARM),
+            None => {
+                let sides: Vec<_> = sums.iter().map(|s| s.right_hand_side.clone()).collect();
+                let mut first = Self {
+                    rank,
+                    weights: solve(&sides),
+                    precision: prior.precision.clone(),
+                    mixing_share: 0.5,
+                };
+                first.precision = first.initial_precision(regions, prior);
+                (first, EM_ITERATIONS)
+            }
         };
-        learned.precision = learned.initial_precision(regions, prior);
-        for _ in 0..EM_ITERATIONS {
+        for _ in 0..iterations {
             let statistics = learned.expectation(regions, prior.noise_factor, executor);
             let [low, high] = MIXING_SHARE_RANGE;
             let share = statistics.responsibility / statistics.count.max(1.0);
             learned.mixing_share = share.clamp(low, high);
-            let mut covariance = statistics.second_moment;
+            let mut covariance = statistics.second_moment.sum();
             let responsibility = statistics.responsibility.max(1.0);
             covariance.iter_mut().for_each(|c| *c /= responsibility);
             linalg::mirror_upper(&mut covariance, rank);
@@ -229,10 +239,9 @@ impl NeighbourPrior {
         let mut solver = PosteriorSolver::new(rank);
         for location in region.bright_locations() {
             let (q, mean) = self.infer(region, noise, location, &mut solver);
-            solver.compute_covariance();
             let errors = solver.mean.iter().zip(mean);
             let error: Vec<f64> = errors.map(|(z, m)| z - m).collect();
-            solver.add_second_moment(&mut sums.second_moment, q, &error);
+            sums.second_moment.add(&mut solver, q, &error);
             sums.responsibility += q;
             sums.count += 1.0;
             let sides = &mut sums.right_hand_sides[class(region, location)];
@@ -247,7 +256,7 @@ impl NeighbourStatistics {
     fn new(rank: usize) -> Self {
         Self {
             right_hand_sides: vec![vec![0.0; PREDICTORS * rank]; CLASSES],
-            second_moment: vec![0.0; rank * rank],
+            second_moment: SecondMoment::new(rank),
             responsibility: 0.0,
             count: 0.0,
         }
@@ -258,7 +267,7 @@ impl NeighbourStatistics {
         for (sum, other) in sides.zip(&other.right_hand_sides) {
             add_scaled(sum, 1.0, other);
         }
-        add_scaled(&mut self.second_moment, 1.0, &other.second_moment);
+        self.second_moment.merge(&other.second_moment);
         self.responsibility += other.responsibility;
         self.count += other.count;
     }
@@ -323,7 +332,7 @@ mod tests {
         let equations = synthetic_equations(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
         let prior = unit_prior();
         let means = [PosteriorMeans::new(&equations, rect, &prior, &[0.0; 3])];
-        let learned = NeighbourPrior::learn(&means, &prior, &SequentialExecutor).unwrap();
+        let learned = NeighbourPrior::learn(&means, &prior, None, &SequentialExecutor).unwrap();
 
         let mut solver = PosteriorSolver::new(2);
         let mut errors = [0.0; 2];
@@ -365,7 +374,7 @@ mod tests {
                 &prior,
                 &[threshold; 3],
             )];
-            assert!(NeighbourPrior::learn(&means, &prior, &SequentialExecutor).is_none());
+            assert!(NeighbourPrior::learn(&means, &prior, None, &SequentialExecutor).is_none());
         }
     }
 }

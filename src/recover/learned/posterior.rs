@@ -16,6 +16,10 @@ use crate::linalg::{self, add_scaled, dot};
 /// Smallest variance along any direction, as a share of the mean variance: keeps the inverse finite.
 const MIN_VARIANCE_SHARE: f64 = 1e-9;
 
+/// One in so many observations whose posterior covariance is computed in an E step, where thousands are averaged. It
+/// takes two thirds of the time, and does not depend on y but through brightness and noise.
+const COVARIANCE_SAMPLING: usize = 4;
+
 /// The inverse of a prior's covariance.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct PriorPrecision {
@@ -117,38 +121,91 @@ impl PosteriorSolver {
         linalg::cholesky_inverse(&self.factor, rank, &mut self.scratch, &mut self.covariance);
     }
 
-    /// Adds `factor · (xxᵀ + K⁻¹)` to `sum`, `[r, r]`, upper triangle, after
-    /// [`compute_covariance`](Self::compute_covariance).
+    /// ‖y − f B ẑ‖² of the posterior just inferred.
     #[inline(always)]
-    pub fn add_second_moment(&self, sum: &mut [f64], factor: f64, x: &[f64]) {
-        let rank = x.len();
-        for i in 0..rank {
-            let row = i * rank + i..(i + 1) * rank;
-            add_scaled(&mut sum[row.clone()], factor * x[i], &x[i..]);
-            add_scaled(&mut sum[row.clone()], factor, &self.covariance[row]);
-        }
+    pub fn squared_residual(&mut self, equations: &ObservationEquations, index: usize) -> f64 {
+        let observation = &equations.observations[index];
+        linalg::multiply_vector(equations.gram(index), &self.mean, &mut self.product);
+        let f = observation.brightness;
+        observation.energy - 2.0 * f * dot(&self.mean, equations.right_hand_side(index))
+            + f * f * dot(&self.mean, &self.product)
     }
 
-    /// E‖y − f B z‖² under the posterior just inferred, whose covariance has been computed.
+    /// E‖f B (z − ẑ)‖² = f² tr(BᵀB K⁻¹), after [`compute_covariance`](Self::compute_covariance).
     #[inline(always)]
-    pub fn expected_squared_residual(
-        &mut self,
-        equations: &ObservationEquations,
-        index: usize,
-    ) -> f64 {
-        let rank = equations.rank;
-        let observation = &equations.observations[index];
-        let gram = equations.gram(index);
-        linalg::multiply_vector(gram, &self.mean, &mut self.product);
-        // tr(BᵀB K⁻¹)
+    pub fn predicted_variance(&self, equations: &ObservationEquations, index: usize) -> f64 {
+        let (rank, gram) = (equations.rank, equations.gram(index));
         let mut trace = 0.0;
         for i in 0..rank {
             let row = i * rank + i..(i + 1) * rank;
             let (g, p) = (&gram[row.clone()], &self.covariance[row]);
             trace += 2.0 * dot(g, p) - g[0] * p[0];
         }
-        let f = observation.brightness;
-        observation.energy - 2.0 * f * dot(&self.mean, equations.right_hand_side(index))
-            + f * f * (dot(&self.mean, &self.product) + trace)
+        equations.observations[index].brightness.powi(2) * trace
+    }
+}
+
+/// Σ w (xxᵀ + K⁻¹) over observations with weights w, `[r, r]`, upper triangle, with K⁻¹ of a sample of them.
+#[derive(Debug)]
+pub(super) struct SecondMoment {
+    /// Σ w xxᵀ.
+    outer: Vec<f64>,
+    /// Σ w K⁻¹ over the sample.
+    covariance: Vec<f64>,
+    /// Σ w over all observations and over the sample.
+    weights: [f64; 2],
+    count: usize,
+}
+
+impl SecondMoment {
+    pub fn new(rank: usize) -> Self {
+        Self {
+            outer: vec![0.0; rank * rank],
+            covariance: vec![0.0; rank * rank],
+            weights: [0.0; 2],
+            count: 0,
+        }
+    }
+
+    /// Adds the observation that `solver` has inferred. Returns whether it is in the sample, and its covariance
+    /// therefore computed.
+    #[inline(always)]
+    pub fn add(&mut self, solver: &mut PosteriorSolver, weight: f64, x: &[f64]) -> bool {
+        let rank = x.len();
+        for i in 0..rank {
+            let row = &mut self.outer[i * rank + i..(i + 1) * rank];
+            add_scaled(row, weight * x[i], &x[i..]);
+        }
+        self.weights[0] += weight;
+        let is_sampled = self.count.is_multiple_of(COVARIANCE_SAMPLING);
+        self.count += 1;
+        if is_sampled {
+            solver.compute_covariance();
+            add_scaled(&mut self.covariance, weight, &solver.covariance);
+            self.weights[1] += weight;
+        }
+        is_sampled
+    }
+
+    pub fn merge(&mut self, other: &Self) {
+        add_scaled(&mut self.outer, 1.0, &other.outer);
+        add_scaled(&mut self.covariance, 1.0, &other.covariance);
+        for (weight, other) in self.weights.iter_mut().zip(other.weights) {
+            *weight += other;
+        }
+        self.count += other.count;
+    }
+
+    /// All observations over the sample, by their weights.
+    pub fn sampling_ratio(&self) -> f64 {
+        let [all, sampled] = self.weights;
+        if sampled > 0.0 { all / sampled } else { 0.0 }
+    }
+
+    /// The sum.
+    pub fn sum(mut self) -> Vec<f64> {
+        let ratio = self.sampling_ratio();
+        add_scaled(&mut self.outer, ratio, &self.covariance);
+        self.outer
     }
 }

@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::equations::{MinReliableBrightness, ObservationEquations, PHASES};
-use super::posterior::{PosteriorSolver, PriorPrecision};
+use super::posterior::{PosteriorSolver, PriorPrecision, SecondMoment};
 use crate::job_executor::Executor;
 use crate::linalg::{self, add_scaled, vectorise};
 
@@ -41,10 +41,12 @@ struct EStepStatistics {
     counts: [f64; PHASES],
     /// Σ ẑ by sub-element position.
     sums: Vec<Vec<f64>>,
-    /// Σ ẑẑᵀ + P, upper triangle.
-    second_moment: Vec<f64>,
-    /// Σ E‖y − f B z‖² / σ², and the number of measurements.
+    /// Σ ẑẑᵀ + P.
+    second_moment: SecondMoment,
+    /// Σ ‖y − f B ẑ‖² / σ².
     squared_residual: f64,
+    /// Σ E‖f B (z − ẑ)‖² / σ² over the sample of the second moment.
+    predicted_variance: f64,
     measurements: f64,
 }
 
@@ -104,7 +106,7 @@ impl Prior {
         only_full: bool,
     ) -> EStepStatistics {
         let mut sums = EStepStatistics::new(self.rank);
-        let mut solver = PosteriorSolver::new(self.rank);
+        let (mut solver, mut mean) = (PosteriorSolver::new(self.rank), vec![0.0; self.rank]);
         for (index, observation) in region.observations.iter().enumerate() {
             if !region.is_reliable(index, min_brightness)
                 || only_full && !observation.has_full_window
@@ -112,12 +114,14 @@ impl Prior {
                 continue;
             }
             self.infer(region, index, &mut solver);
-            solver.compute_covariance();
             sums.counts[observation.phase] += 1.0;
             add_scaled(&mut sums.sums[observation.phase], 1.0, &solver.mean);
-            solver.add_second_moment(&mut sums.second_moment, 1.0, &solver.mean);
-            sums.squared_residual +=
-                solver.expected_squared_residual(region, index) / observation.variance;
+            sums.squared_residual += solver.squared_residual(region, index) / observation.variance;
+            mean.copy_from_slice(&solver.mean);
+            if sums.second_moment.add(&mut solver, 1.0, &mean) {
+                sums.predicted_variance +=
+                    solver.predicted_variance(region, index) / observation.variance;
+            }
             sums.measurements += observation.count as f64;
         }
         sums
@@ -133,7 +137,9 @@ impl Prior {
         let pooled_mean: Vec<f64> = (0..rank)
             .map(|k| statistics.sums.iter().map(|sum| sum[k]).sum::<f64>() / count)
             .collect();
-        let mut covariance = statistics.second_moment;
+        let squared_residual = statistics.squared_residual
+            + statistics.second_moment.sampling_ratio() * statistics.predicted_variance;
+        let mut covariance = statistics.second_moment.sum();
         for (phase, sum) in statistics.sums.iter().enumerate() {
             let n = statistics.counts[phase];
             self.means[phase] = (0..rank)
@@ -152,7 +158,7 @@ impl Prior {
         linalg::mirror_upper(&mut covariance, rank);
         self.precision = PriorPrecision::new(&covariance, rank);
         self.covariance = covariance;
-        let factor = statistics.squared_residual / statistics.measurements;
+        let factor = squared_residual / statistics.measurements;
         self.noise_factor = factor.max(MIN_NOISE_FACTOR);
     }
 }
@@ -162,8 +168,9 @@ impl EStepStatistics {
         Self {
             counts: [0.0; PHASES],
             sums: vec![vec![0.0; rank]; PHASES],
-            second_moment: vec![0.0; rank * rank],
+            second_moment: SecondMoment::new(rank),
             squared_residual: 0.0,
+            predicted_variance: 0.0,
             measurements: 0.0,
         }
     }
@@ -173,8 +180,9 @@ impl EStepStatistics {
             self.counts[phase] += other.counts[phase];
             add_scaled(&mut self.sums[phase], 1.0, &other.sums[phase]);
         }
-        add_scaled(&mut self.second_moment, 1.0, &other.second_moment);
+        self.second_moment.merge(&other.second_moment);
         self.squared_residual += other.squared_residual;
+        self.predicted_variance += other.predicted_variance;
         self.measurements += other.measurements;
     }
 }

@@ -13,6 +13,7 @@ use super::equations::{ObservationEquations, min_reliable_brightness, with_margi
 use super::inference::LearnedModel;
 use super::initial_prior::{MAX_INITIAL_RANK, initial_prior, smooth, truncate_basis};
 use super::neighbour_prior::NeighbourPrior;
+use super::nnls_blending::centre;
 use super::nonnegativity::NonNegativityPenalty;
 use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PosteriorMeans};
 use crate::job_executor::Executor;
@@ -35,6 +36,8 @@ const FINAL_EM_ITERATIONS: usize = 2;
 /// Training regions of the neighbour prior, and their side.
 const MAX_REGIONS: usize = 64;
 const REGION_SIDE_PX: u32 = 16;
+/// Side of the middle of a region that decides whether the neighbour prior helps.
+const SELECTION_SIDE_PX: u32 = 8;
 /// Memory for the regions' Gram matrices. Where many windows differ, or saturated samples leave pixels Gram matrices of
 /// their own, there are fewer regions, but at least `MIN_REGIONS`.
 const MAX_GRAM_BYTES: usize = 144 << 20;
@@ -91,7 +94,10 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
                 neighbour_prior: None,
                 min_brightness,
             };
-            let error = self.held_out_error(&model, &squares);
+            let errors = self.executor.map(squares.len(), |i| {
+                model.held_out_errors(self.measurements, self.split, squares[i])[0]
+            });
+            let error = errors.iter().sum();
             let least = chosen.as_ref().map_or(error, |(least, _)| least.min(error));
             if error <= (1.0 + MAX_ERROR_INCREASE) * least {
                 chosen = Some((least, model));
@@ -116,13 +122,14 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
         spread_squares(self.measurements, REGION_SIDE_PX, fit.max(MIN_REGIONS))
     }
 
-    /// Continues EM of the pixel prior on `regions` and learns the neighbour prior, both from the patterns
-    /// `pattern_indices`.
-    pub(super) fn fit_neighbour_prior(
+    /// Continues EM of the pixel prior on `regions` from the patterns `pattern_indices`, and learns the neighbour prior,
+    /// anew or from the one that the model has, or removes it.
+    pub(super) fn fit_priors(
         &self,
         model: &mut LearnedModel,
         pattern_indices: &[usize],
         regions: &[TileRect],
+        learn_neighbour_prior: bool,
     ) {
         let equations = self.executor.map(regions.len(), |i| {
             let rect = self.with_neighbours(regions[i]);
@@ -132,24 +139,23 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
         for _ in 0..FINAL_EM_ITERATIONS {
             prior.em_iteration(&equations, min_brightness, self.executor);
         }
-        let means = self.executor.map(regions.len(), |i| {
-            PosteriorMeans::new(&equations[i], regions[i], prior, min_brightness)
-        });
-        model.neighbour_prior = NeighbourPrior::learn(&means, prior, self.executor);
+        let start = model.neighbour_prior.take();
+        if learn_neighbour_prior {
+            let means = self.executor.map(regions.len(), |i| {
+                PosteriorMeans::new(&equations[i], regions[i], prior, min_brightness)
+            });
+            model.neighbour_prior = NeighbourPrior::learn(&means, prior, start, self.executor);
+        }
     }
 
-    /// Removes the neighbour prior unless it lowers the error on held-out patterns over `regions`. Returns whether it
-    /// does.
-    pub(super) fn select_neighbour_prior(
-        &self,
-        model: &mut LearnedModel,
-        regions: &[TileRect],
-    ) -> bool {
-        let with = self.held_out_error(model, regions);
-        let neighbour_prior = model.neighbour_prior.take();
-        let without = self.held_out_error(model, regions);
-        model.neighbour_prior = neighbour_prior.filter(|_| with < without);
-        model.neighbour_prior.is_some()
+    /// Removes the neighbour prior unless it lowers the error on held-out patterns over the middles of `regions`.
+    pub(super) fn select_neighbour_prior(&self, model: &mut LearnedModel, regions: &[TileRect]) {
+        let errors = self.executor.map(regions.len(), |i| {
+            let rect = centre(regions[i], SELECTION_SIDE_PX);
+            model.held_out_errors(self.measurements, self.split, rect)
+        });
+        let [without, with] = [0, 1].map(|i| errors.iter().map(|e| e[i]).sum::<f64>());
+        model.neighbour_prior = model.neighbour_prior.take().filter(|_| with < without);
     }
 
     fn equations(
@@ -164,12 +170,5 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
 
     fn with_neighbours(&self, rect: TileRect) -> TileRect {
         with_margin(self.measurements, rect, NEIGHBOURHOOD_RADIUS)
-    }
-
-    fn held_out_error(&self, model: &LearnedModel, rects: &[TileRect]) -> f64 {
-        let errors = self.executor.map(rects.len(), |i| {
-            model.held_out_error(self.measurements, self.split, rects[i])
-        });
-        errors.iter().sum()
     }
 }
