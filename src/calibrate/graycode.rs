@@ -76,6 +76,33 @@ pub struct GrayCodePhotos {
 }
 
 impl GrayCodePhotos {
+    /// The photographs of every bit of a light plane; `photo` gives that of an axis, a bit, and whether its pattern was
+    /// inverted. None may be missing: a gap would shift the bits below it.
+    ///
+    /// # Errors
+    /// The first of `photo`.
+    pub fn collect<E>(
+        light: Extent,
+        rows: Vec<u32>,
+        photo: impl Fn(LightPlaneAxis, u32, bool) -> Result<Vec<[f32; CHANNELS]>, E>,
+    ) -> Result<Self, E> {
+        let bits = |axis, side: u32| {
+            let pair = |bit| {
+                Ok(BitPair {
+                    plain: photo(axis, bit, false)?,
+                    inverted: photo(axis, bit, true)?,
+                })
+            };
+            let bits = side.next_power_of_two().ilog2().max(1);
+            (0..bits).rev().map(pair).collect::<Result<_, E>>()
+        };
+        Ok(Self {
+            x: bits(LightPlaneAxis::X, light.width)?,
+            y: bits(LightPlaneAxis::Y, light.height)?,
+            rows,
+        })
+    }
+
     /// Decodes all pixels and fits an affine map to their positions. `camera` is the size of the camera grid.
     ///
     /// # Errors

@@ -1,9 +1,8 @@
 //! The WebAssembly surface: thin wrappers of [`format`](crate::format) and [`relight`](crate::relight) for JavaScript.
 //!
 //! Each feature is a module that browsers load when they need it: the decoder, the recovery, and the backends CPU, WebGL2
-//! and WebGPU.
-//! Each module has its own memory, so a photograph is decoded in one and transferred to others ([`transfer`]). Every
-//! failure is thrown as a JavaScript `Error` with a `code` ([`CodedError`]).
+//! and WebGPU. Each module has its own memory, so a photograph is decoded in one and transferred to others. Every failure
+//! is thrown as a JavaScript `Error` with a `code` ([`CodedError`]).
 
 #[cfg(feature = "cpu")]
 mod canvas2d;

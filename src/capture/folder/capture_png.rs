@@ -8,13 +8,15 @@ use std::io::{BufReader, ErrorKind};
 
 use png::{BitDepth, ColorType, Transformations};
 
-use super::files::CaptureFiles;
+use super::files::{CaptureFile, CaptureFiles};
 use crate::capture::error::{CaptureError, CaptureErrorKind};
 use crate::capture::measurements::Pattern;
 use crate::transport::{CHANNELS, Extent};
 
 /// Bytes read from a file at a time.
 const READ_BYTES: usize = 1 << 16;
+
+type PngReader<'a, F> = png::Reader<BufReader<CaptureFile<'a, F>>>;
 
 /// A PNG and what the manifest says of it.
 pub(super) struct CapturePng<'a, F> {
@@ -82,11 +84,8 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
         Ok(Rgb16RowReader { reader, file: self })
     }
 
-    fn open(
-        &self,
-        transformations: Transformations,
-    ) -> Result<png::Reader<BufReader<F::File>>, CaptureError> {
-        let file = self.files.open(self.name).map_err(|e| match e.kind() {
+    fn open(&self, transformations: Transformations) -> Result<PngReader<'a, F>, CaptureError> {
+        let file = CaptureFile::open(self.files, self.name).map_err(|e| match e.kind() {
             ErrorKind::NotFound => self.error(CaptureErrorKind::Missing),
             _ => self.error(CaptureErrorKind::Io(e)),
         })?;
@@ -130,7 +129,7 @@ fn sample_type((color, depth): (ColorType, BitDepth)) -> String {
 /// A 16-bit RGB photograph that is read row by row from the top.
 pub(super) struct Rgb16RowReader<'a, F: CaptureFiles> {
     file: CapturePng<'a, F>,
-    reader: png::Reader<BufReader<F::File>>,
+    reader: PngReader<'a, F>,
 }
 
 impl<F: CaptureFiles> Rgb16RowReader<'_, F> {

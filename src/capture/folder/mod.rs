@@ -20,12 +20,13 @@ pub use self::photograph_row_reader::{DarkFrame, PhotographRowReader};
 pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
 use self::capture_png::CapturePng;
+use self::files::CaptureFile;
 use super::camera_row_set::CameraRowSet;
 use super::error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 use super::manifest::{GrayCodeShot, Manifest};
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
-use crate::calibrate::{BitPair, GrayCodePhotos, LightPlaneAxis};
+use crate::calibrate::GrayCodePhotos;
 use crate::transport::{CHANNELS, Correspondence};
 
 /// A capture folder with its checked manifest.
@@ -75,8 +76,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
     pub fn from_files(files: F) -> Result<Self, CaptureError> {
         let path = files.path(MANIFEST_NAME);
         let mut text = String::new();
-        files
-            .open(MANIFEST_NAME)
+        CaptureFile::open(&files, MANIFEST_NAME)
             .and_then(|mut file| file.read_to_string(&mut text))
             .map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)))?;
         // Some editors write a byte order mark, which is not JSON.
@@ -123,49 +123,29 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         rows: &CameraRowSet,
     ) -> Result<GrayCodePhotos, CaptureError> {
         let light = &self.manifest.light;
-        Ok(GrayCodePhotos {
-            x: self.read_bits(LightPlaneAxis::X, light.width, dark, rows)?,
-            y: self.read_bits(LightPlaneAxis::Y, light.height, dark, rows)?,
-            rows: rows.iter().collect(),
-        })
-    }
-
-    /// Every bit of an axis with `side` elements, the most significant first. None may be missing: a gap would shift
-    /// the bits below it.
-    fn read_bits(
-        &self,
-        axis: LightPlaneAxis,
-        side: u32,
-        dark: &DarkFrame,
-        rows: &CameraRowSet,
-    ) -> Result<Vec<BitPair>, CaptureError> {
-        let read = |bit, inverted| {
-            let mut shots = self.manifest.graycode.iter().enumerate();
-            let bit_of = |shot: &GrayCodeShot| (shot.axis, shot.bit, shot.inverted);
-            let found = shots.find(|(_, shot)| bit_of(shot) == (axis, bit, inverted));
-            let Some((i, shot)) = found else {
-                let problem = CaptureErrorKind::MissingGrayCode {
-                    axis,
-                    bit,
-                    inverted,
+        GrayCodePhotos::collect(
+            light.extent(),
+            rows.iter().collect(),
+            |axis, bit, inverted| {
+                let mut shots = self.manifest.graycode.iter().enumerate();
+                let bit_of = |shot: &GrayCodeShot| (shot.axis, shot.bit, shot.inverted);
+                let found = shots.find(|(_, shot)| bit_of(shot) == (axis, bit, inverted));
+                let Some((i, shot)) = found else {
+                    let problem = CaptureErrorKind::MissingGrayCode {
+                        axis,
+                        bit,
+                        inverted,
+                    };
+                    return Err(CaptureError::new(self.manifest_path(), problem));
                 };
-                return Err(CaptureError::new(self.manifest_path(), problem));
-            };
-            let field = format!("graycode[{i}].photo");
-            let mut reader = self.open_photo(&shot.photo, field, 1.0, dark)?;
-            let mut photo = LinearPhoto::new();
-            reader.read(rows, &mut photo)?;
-            reader.finish()?;
-            Ok(photo)
-        };
-        let pair = |bit| {
-            Ok(BitPair {
-                plain: read(bit, false)?,
-                inverted: read(bit, true)?,
-            })
-        };
-        let bits = side.next_power_of_two().ilog2().max(1);
-        (0..bits).rev().map(pair).collect()
+                let field = format!("graycode[{i}].photo");
+                let mut reader = self.open_photo(&shot.photo, field, 1.0, dark)?;
+                let mut photo = LinearPhoto::new();
+                reader.read(rows, &mut photo)?;
+                reader.finish()?;
+                Ok(photo)
+            },
+        )
     }
 
     /// Reads the dark frame; zeros if there is none.

@@ -1,6 +1,6 @@
 //! The files of a capture that a page has: a dropped folder, or the contents of a zip.
 
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 
 use wasm_bindgen::JsValue;
@@ -16,12 +16,17 @@ extern "C" {
     pub type PageFiles;
 
     /// Bytes of the file `name`; `undefined` if there is no such file.
-    #[wasm_bindgen(method, catch)]
-    fn size(this: &PageFiles, name: &str) -> Result<Option<f64>, JsValue>;
+    #[wasm_bindgen(method, catch, js_name = size)]
+    fn size_of(this: &PageFiles, name: &str) -> Result<Option<f64>, JsValue>;
 
     /// `length` bytes from `offset` on.
-    #[wasm_bindgen(method, catch)]
-    fn read(this: &PageFiles, name: &str, offset: f64, length: f64) -> Result<Vec<u8>, JsValue>;
+    #[wasm_bindgen(method, catch, js_name = read)]
+    fn read_bytes(
+        this: &PageFiles,
+        name: &str,
+        offset: f64,
+        length: f64,
+    ) -> Result<Vec<u8>, JsValue>;
 }
 
 #[wasm_bindgen(typescript_custom_section)]
@@ -35,57 +40,24 @@ export interface PageFiles {
 }";
 
 impl CaptureFiles for PageFiles {
-    type File = PageFile;
+    fn size(&self, name: &str) -> io::Result<u64> {
+        let size = self.size_of(name).map_err(|thrown| read_error(&thrown))?;
+        Ok(size.ok_or(ErrorKind::NotFound)? as u64)
+    }
 
-    fn open(&self, name: &str) -> io::Result<PageFile> {
-        let size = self.size(name).map_err(|thrown| read_error(&thrown))?;
-        Ok(PageFile {
-            files: self.clone(),
-            name: name.to_owned(),
-            position: 0,
-            length: size.ok_or(ErrorKind::NotFound)? as u64,
-        })
+    fn read(&self, name: &str, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = CaptureFiles::size(self, name)?
+            .saturating_sub(offset)
+            .min(buffer.len() as u64);
+        let bytes = self.read_bytes(name, offset as f64, count as f64);
+        let bytes = bytes.map_err(|thrown| read_error(&thrown))?;
+        let bytes = &bytes[..bytes.len().min(buffer.len())];
+        buffer[..bytes.len()].copy_from_slice(bytes);
+        Ok(bytes.len())
     }
 
     fn path(&self, name: &str) -> PathBuf {
         name.into()
-    }
-}
-
-/// An opened file.
-#[derive(Debug)]
-pub struct PageFile {
-    files: PageFiles,
-    name: String,
-    position: u64,
-    length: u64,
-}
-
-impl Read for PageFile {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self
-            .length
-            .saturating_sub(self.position)
-            .min(buffer.len() as u64);
-        let (offset, length) = (self.position as f64, count as f64);
-        let bytes = self.files.read(&self.name, offset, length);
-        let bytes = bytes.map_err(|thrown| read_error(&thrown))?;
-        let bytes = &bytes[..bytes.len().min(buffer.len())];
-        buffer[..bytes.len()].copy_from_slice(bytes);
-        self.position += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-}
-
-impl Seek for PageFile {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let position = match to {
-            SeekFrom::Start(position) => Some(position),
-            SeekFrom::Current(by) => self.position.checked_add_signed(by),
-            SeekFrom::End(by) => self.length.checked_add_signed(by),
-        };
-        self.position = position.ok_or(ErrorKind::InvalidInput)?;
-        Ok(self.position)
     }
 }
 

@@ -5,7 +5,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::capture_files::PageFiles;
 use super::progress::{ReportingExecutor, report_job};
-use crate::calibrate::{BitPair, GrayCodePhotos, LightPlaneAxis};
+use crate::calibrate::{GrayCodePhotos, LightPlaneAxis};
 use crate::capture::{
     CameraRowSet, CaptureFolder, LinearPhoto, Manifest, Measurements, NoiseModel, Pattern, Shot,
 };
@@ -297,34 +297,18 @@ impl MeasurementBuilder {
     }
 
     fn decode_gray_code(&self) -> Result<Correspondence, CodedError> {
-        let bits = |axis, side: u32| -> Result<Vec<BitPair>, CodedError> {
-            let photo = |bit, inverted| {
-                let mut photos = self.gray_code.iter();
-                let found = photos.find(|(found, _)| *found == (axis, bit, inverted));
-                found.map(|(_, photo)| photo.clone()).ok_or_else(|| {
-                    let message = format!(
-                        "the Gray code lacks axis {axis}, bit {bit}, inverted {inverted}; give all bits, \
-                         or the correspondence"
-                    );
-                    CodedError::new("recover-correspondence", message)
-                })
-            };
-            let pair = |bit| {
-                Ok(BitPair {
-                    plain: photo(bit, false)?,
-                    inverted: photo(bit, true)?,
-                })
-            };
-            (0..side.next_power_of_two().ilog2().max(1))
-                .rev()
-                .map(pair)
-                .collect()
-        };
-        let photos = GrayCodePhotos {
-            x: bits(LightPlaneAxis::X, self.light.width)?,
-            y: bits(LightPlaneAxis::Y, self.light.height)?,
-            rows: (0..self.camera.height).collect(),
-        };
+        let rows = (0..self.camera.height).collect();
+        let photos = GrayCodePhotos::collect(self.light, rows, |axis, bit, inverted| {
+            let mut photos = self.gray_code.iter();
+            let found = photos.find(|(found, _)| *found == (axis, bit, inverted));
+            found.map(|(_, photo)| photo.clone()).ok_or_else(|| {
+                let message = format!(
+                    "the Gray code lacks axis {axis}, bit {bit}, inverted {inverted}; give all bits, \
+                     or the correspondence"
+                );
+                CodedError::new("recover-correspondence", message)
+            })
+        })?;
         Ok(photos.correspondence(self.camera)?)
     }
 

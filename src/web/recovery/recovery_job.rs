@@ -140,7 +140,7 @@ impl Recovery {
             _ if lossless => FileQuality::Lossless,
             _ => FileQuality::ByNoise,
         };
-        let metadata = export::metadata(&self.input.manifest, &self.input.shots, self.method);
+        let metadata = self.metadata();
         let file = ReportingExecutor::run(on_job, |executor| {
             let record = |i| self.record(i);
             export::encode_file(self.recovery(), &record, metadata, quality, executor)
