@@ -5,7 +5,7 @@ use std::error::Error;
 use anyhow::Error as AnyError;
 
 use crate::calibrate::CalibrationError;
-use crate::capture::{CaptureError, CaptureErrorKind};
+use crate::export::capture_remedy;
 use crate::recover::RecoverError;
 
 /// The text of `error` and its causes, followed by the remedy if there is one.
@@ -17,8 +17,8 @@ pub fn error_with_remedy(error: &AnyError) -> String {
 }
 
 fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
-    if let Some(CaptureError { field, problem, .. }) = error.downcast_ref() {
-        return capture_remedy(field.is_some(), problem);
+    if let Some(error) = error.downcast_ref() {
+        return capture_remedy(error);
     }
     Some(match error.downcast_ref() {
         Some(CalibrationError::MissingBits(_)) => "photograph them, or give \"correspondence\"",
@@ -26,26 +26,6 @@ fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
             "photograph the Gray code again with more light, or give \"correspondence\""
         }
         None => return error.downcast_ref().and_then(recovery_remedy),
-    })
-}
-
-fn capture_remedy(is_named: bool, problem: &CaptureErrorKind) -> Option<&'static str> {
-    Some(match problem {
-        CaptureErrorKind::Missing if is_named => "add it or correct its name",
-        CaptureErrorKind::NotACapture(_) => "give the folder that holds capture.json",
-        CaptureErrorKind::UnknownVersion(_) => "get a newer program",
-        CaptureErrorKind::MissingResponse => {
-            "give the gamma of the monitor or projector, usually about 2.2, or its measured response"
-        }
-        CaptureErrorKind::ConflictingResponse => "remove one of them",
-        CaptureErrorKind::NoShots => "list the patterns and their photographs",
-        CaptureErrorKind::MissingGrayCode { .. } => "add it, or give \"correspondence\"",
-        CaptureErrorKind::Unreadable(_) => "export or copy it again",
-        CaptureErrorKind::WrongExtent { .. } => "correct one of them",
-        CaptureErrorKind::PhotoType(_) => "export it again from raw",
-        CaptureErrorKind::PatternType(_) => "convert it",
-        CaptureErrorKind::Interlaced => "save it without interlacing",
-        _ => return None,
     })
 }
 

@@ -4,6 +4,7 @@
 //! recovered one by one into [records](encode_tile), from which [`encode_file`] makes the file. [`MemoryPlan`] keeps
 //! all of it within a limit. Reading, threads and progress are the caller's.
 
+mod capture_remedy;
 mod encoding;
 mod memory_plan;
 mod metadata;
@@ -11,6 +12,7 @@ mod preparation;
 mod shot_selection;
 mod tile_record;
 
+pub use capture_remedy::capture_remedy;
 pub use encoding::{FileQuality, encode_file, file_geometry, file_tile};
 pub use memory_plan::{MemoryPlan, TooLittleMemory};
 pub use metadata::metadata;

@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use crate::calibrate::CalibrationError;
 use crate::capture::{CaptureError, CaptureErrorKind};
-use crate::export::{TooFewShots, TooLittleMemory};
+use crate::export::{TooFewShots, TooLittleMemory, capture_remedy};
 use crate::recover::RecoverError;
 use crate::transport::GeometryError;
 use crate::web::CodedError;
@@ -12,39 +12,30 @@ use crate::web::CodedError;
 impl From<CaptureError> for CodedError {
     fn from(error: CaptureError) -> Self {
         use CaptureErrorKind as Kind;
-        let (code, remedy) = match &error.problem {
-            Kind::NotACapture(_) => ("capture-manifest", ""),
+        let code = match &error.problem {
             // The manifest itself.
-            Kind::Io(_) if error.field.is_none() => (
-                "capture-manifest",
-                "give the folder that holds capture.json",
-            ),
-            Kind::Missing => ("capture-file", "add it or correct its name"),
-            Kind::Io(_) => ("capture-file", ""),
-            Kind::Unreadable(_) => ("capture-file", "export or copy it again"),
-            Kind::UnknownVersion(_) => ("capture-manifest", "get a newer version of this page"),
-            Kind::MissingResponse => (
-                "capture-manifest",
-                "give the gamma of the monitor or projector, usually about 2.2, or its measured response",
-            ),
-            Kind::ConflictingResponse => ("capture-manifest", "remove one of them"),
-            Kind::NoShots => (
-                "capture-manifest",
-                "list the patterns and their photographs",
-            ),
-            Kind::MissingGrayCode { .. } => {
-                ("capture-manifest", "add it, or give \"correspondence\"")
-            }
-            Kind::NotAManifest(_)
+            Kind::Io(_) if error.field.is_none() => "capture-manifest",
+            Kind::Missing | Kind::Io(_) | Kind::Unreadable(_) => "capture-file",
+            Kind::WrongExtent { .. } => "capture-size",
+            Kind::PhotoType(_) | Kind::Interlaced => "capture-photograph",
+            Kind::PatternType(_) => "capture-pattern",
+            Kind::NotACapture(_)
+            | Kind::UnknownVersion(_)
+            | Kind::MissingResponse
+            | Kind::ConflictingResponse
+            | Kind::NoShots
+            | Kind::MissingGrayCode { .. }
+            | Kind::NotAManifest(_)
             | Kind::FieldType(..)
             | Kind::OutOfRange { .. }
             | Kind::InvalidResponse
             | Kind::NotInvertible
-            | Kind::InvalidTruth(_) => ("capture-manifest", ""),
-            Kind::WrongExtent { .. } => ("capture-size", "correct one of them"),
-            Kind::PhotoType(_) => ("capture-photograph", "export it again from raw"),
-            Kind::PatternType(_) => ("capture-pattern", "convert it"),
-            Kind::Interlaced => ("capture-photograph", "save it without interlacing"),
+            | Kind::InvalidTruth(_) => "capture-manifest",
+        };
+        let remedy = match &error.problem {
+            Kind::Io(_) if error.field.is_none() => "give the folder that holds capture.json",
+            Kind::UnknownVersion(_) => "get a newer version of this page",
+            _ => capture_remedy(&error).unwrap_or_default(),
         };
         with_remedy(code, &error, remedy)
     }
