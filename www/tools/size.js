@@ -26,8 +26,8 @@ const MODULES = {
   },
   webgpu: { builds: ['wasm/webgpu_bg.wasm'], scripts: ['wasm/webgpu.js'] },
 };
-/** The module of recovery, which pages load only to recover. */
-const RECOVERY = 'wasm/recovery_bg.wasm';
+/** The module of recovery, which is not in the package yet. */
+const RECOVERY = '../target/wasm/built/recovery.wasm';
 const ELEMENT = 'relightable-photo.js';
 
 /** Maximum sizes in kilobytes of 1000 bytes. */
