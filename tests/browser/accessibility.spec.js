@@ -1,17 +1,16 @@
 /** Accessibility: axe-core in each state, roles and focus, languages, sizes of the controls. */
 
-import { join } from 'node:path';
 import { expect, test } from './fixtures.js';
 import {
   alertOf,
   axeViolations,
   boxOf,
   mountPhoto,
+  saveScreenshot,
   waitForEvents,
   waitForLoad,
   waitUntil,
 } from './page-helpers.js';
-import { SCREENSHOTS } from './test-photos.js';
 
 /** @typedef {import('@playwright/test').Page} Page */
 
@@ -95,9 +94,7 @@ test('axe finds no violation on a page with a photograph in any state', async ({
     await step(`axe finds no violation on a page with a photograph ${state}`, async () => {
       await enter(page);
       expect.soft(await axeViolations(page)).toStrictEqual([]);
-      await page.screenshot({
-        path: join(SCREENSHOTS, `element-${state.replaceAll(' ', '-')}.png`),
-      });
+      await saveScreenshot(page, `element-${state.replaceAll(' ', '-')}.png`);
     });
   }
 });
@@ -234,6 +231,6 @@ test.describe('controls', () => {
     expect(box.height).toBeGreaterThanOrEqual(32);
     expect(box.x + box.width).toBeLessThanOrEqual(frame.x + frame.width);
     expect(await axeViolations(page)).toStrictEqual([]);
-    await page.screenshot({ path: join(SCREENSHOTS, 'element-large-text.png') });
+    await saveScreenshot(page, 'element-large-text.png');
   });
 });

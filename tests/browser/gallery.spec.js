@@ -6,12 +6,11 @@ import { expect, test } from './fixtures.js';
 import {
   boxOf,
   dominantColour,
-  horizontalOverflow,
+  saveScreenshot,
   screenPicture,
   waitForFrames,
   waitUntil,
 } from './page-helpers.js';
-import { SCREENSHOTS } from './test-photos.js';
 
 /** @param {import('@playwright/test').Page} page */
 async function waitUntilDrawn(page) {
@@ -78,9 +77,7 @@ test.describe('the gallery', () => {
         await page.evaluate("document.getElementById('photo').toBlob().then(() => {})");
         await waitForFrames(page, 2);
         means.push((await brightnessOf(page)).mean);
-        await page
-          .locator('.hero .frame')
-          .screenshot({ path: join(SCREENSHOTS, `${name.toLowerCase()}.png`) });
+        await saveScreenshot(page.locator('.hero .frame'), `${name.toLowerCase()}.png`);
       }
       const [flood = 0, torch = 0, spectrum = 0] = means;
       expect(flood, String(means)).toBeGreaterThan(spectrum);
@@ -137,7 +134,7 @@ test.describe('the gallery', () => {
       expect(await page.getByRole('radio', { checked: true }).count()).toBe(0);
       await expect.poll(async () => (await brightnessOf(page)).x).toBeLessThan(before.x - 0.1);
       const half = await brightnessOf(page);
-      await page.screenshot({ path: join(SCREENSHOTS, 'page-own-light.png'), fullPage: true });
+      await saveScreenshot(page, 'page-own-light.png');
       await page.getByRole('radio', { name: 'Flood' }).check();
       await expect.poll(async () => (await brightnessOf(page)).x).toBeGreaterThan(half.x + 0.1);
       const odd = { name: 'odd.png', mimeType: 'image/png', buffer: Buffer.from('nothing') };
@@ -183,24 +180,6 @@ test.describe('the gallery', () => {
         );
         expect(margins).toStrictEqual([0, 0, 0, 0]);
       });
-    }
-  });
-
-  test('does not scroll sideways at any width, in light and dark', async ({ openPage, step }) => {
-    const page = await openPage('/?light=torch');
-    await waitUntilDrawn(page);
-    for (const width of [390, 820, 1440]) {
-      await page.setViewportSize({ width, height: width < 500 ? 844 : 900 });
-      for (const colorScheme of /** @type {const} */ (['light', 'dark'])) {
-        await page.emulateMedia({ colorScheme });
-        await step(`it does not scroll sideways at ${width} pixels, ${colorScheme}`, async () => {
-          expect(await horizontalOverflow(page)).toBe(0);
-          await page.screenshot({
-            path: join(SCREENSHOTS, `page-${width}-${colorScheme}.png`),
-            fullPage: true,
-          });
-        });
-      }
     }
   });
 });

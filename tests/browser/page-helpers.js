@@ -1,5 +1,6 @@
 /** What tests do with a page: put an element into it, wait for its events, read its picture. */
 
+import { join } from 'node:path';
 import { expect } from '@playwright/test';
 import { decodePng } from '../../www/tools/pictures.js';
 
@@ -151,6 +152,23 @@ export function decodeDataUrl(url) {
 export async function screenPicture(page, selector = 'relightable-photo') {
   // To hide the caret, Playwright would set inline styles, which strict policies refuse.
   return decodePng(await page.locator(selector).screenshot({ caret: 'initial' }));
+}
+
+const SCREENSHOTS = join(import.meta.dirname, '../../target/screenshots');
+
+/**
+ * Writes a picture for people to look at to target/screenshots, if the environment has `SCREENSHOTS`. No test reads it,
+ * and a long page takes a second.
+ *
+ * @param {Page | import('@playwright/test').Locator} subject
+ * @param {string} name of the file
+ */
+export async function saveScreenshot(subject, name) {
+  if (!process.env['SCREENSHOTS']) return;
+  await subject.screenshot({
+    path: join(SCREENSHOTS, name),
+    ...('goto' in subject && { fullPage: true }),
+  });
 }
 
 /**

@@ -8,8 +8,8 @@ import { gunzipSync } from 'node:zlib';
 import { transform } from 'esbuild';
 import { ARCHIVE, HAND_WRITTEN, PAGES } from '../../www/tools/pages.js';
 import { expect, test } from './fixtures.js';
-import { axeViolations, horizontalOverflow } from './page-helpers.js';
-import { FOLDER, SCREENSHOTS } from './test-photos.js';
+import { axeViolations, horizontalOverflow, saveScreenshot } from './page-helpers.js';
+import { FOLDER } from './test-photos.js';
 
 /** @typedef {import('@playwright/test').Page} Page */
 
@@ -95,20 +95,17 @@ test.describe('the site', () => {
       const widths = HAND_WRITTEN.includes(name) ? [320, 390, 820, 1440] : [320, 1440];
       for (const width of widths) {
         await page.setViewportSize({ width, height: 900 });
-        await step(`${name} does not scroll sideways at ${width} pixels`, async () => {
-          expect(await horizontalOverflow(page)).toBe(0);
-        });
-        if (![390, 1440].includes(width)) continue;
-        const path = join(
-          SCREENSHOTS,
-          `site-${name.replace('.html', '').replace('/', '-')}-${width}.png`,
-        );
-        await page.screenshot({ path, fullPage: true });
         for (const colorScheme of /** @type {const} */ (['dark', 'light'])) {
           await page.emulateMedia({ colorScheme });
-          await step(
-            `axe finds no violation on ${name}: ${colorScheme}, ${width} pixels`,
-            async () => expect(await axeViolations(page)).toStrictEqual([]),
+          const state = `${name} at ${width} pixels, ${colorScheme}`;
+          await step(`${state}, does not scroll sideways`, async () =>
+            expect(await horizontalOverflow(page)).toBe(0),
+          );
+          if (![390, 1440].includes(width)) continue;
+          const picture = name.replace('.html', '').replace('/', '-');
+          await saveScreenshot(page, `site-${picture}-${width}-${colorScheme}.png`);
+          await step(`${state}, has no violation that axe finds`, async () =>
+            expect(await axeViolations(page)).toStrictEqual([]),
           );
         }
       }
@@ -243,9 +240,10 @@ test.describe('the playground', () => {
 
 test.describe('the samples', () => {
   test('are shown unchanged', async ({ openPage }) => {
+    const page = await openPage('/blank');
     const names = new Set();
     for (const name of PAGES.filter((page) => page.startsWith('docs/'))) {
-      const page = await openPage(`/${name}`);
+      await page.goto(`/${name}`);
       for (const code of await page.locator('[data-sample]').all()) {
         const file = (await code.getAttribute('data-sample')) ?? '';
         expect(await code.textContent(), file).toBe(sample(file).trimEnd());

@@ -16,8 +16,6 @@ const program = join(repository, 'target/release/ltm-export');
 
 /** Folder of the photographs that the test server serves. */
 export const FOLDER = join(repository, 'target/browser-tests/photos');
-/** Pictures for people to look at. No test reads them. */
-export const SCREENSHOTS = join(repository, 'target/screenshots');
 export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 'fire'];
 
 const GLASS = join(FOLDER, 'glass.ltm');
@@ -55,7 +53,6 @@ export const DAMAGED = {
 
 /** Writes all test photographs, unless this build of ltm-export has written them before. */
 export function makeTestPhotos() {
-  mkdirSync(SCREENSHOTS, { recursive: true });
   const build = createHash('sha256')
     .update(readFileSync(program))
     .update(readFileSync(import.meta.filename))

@@ -27,6 +27,9 @@ async function expectSpectrum(page) {
 /** Waits until the browser has ended all workers. @param {import('@playwright/test').Page} page */
 const waitForPoolEnd = (page) => expect.poll(() => poolOf(page).length).toBe(0);
 
+/** Longer than the element waits for a silent worker. */
+const SILENCE_MS = 25_000;
+
 /** A message that no client sends: the worker fails. */
 const INVALID_MESSAGE = "{ id: 0, task: { photo: -1, task: { kind: 'plan' } } }";
 
@@ -228,13 +231,15 @@ test.describe('the worker pool', () => {
     ['silently', 'relighters.at(-1).terminate()'],
   ])) {
     test(`loads the photograph again when a worker stops ${how}`, async ({ openPhoto }) => {
-      const page = await openPhoto(TALL, { before: recordWorkers });
+      const page = await openPhoto(TALL, { before: recordWorkers, fakeClock: true });
       const before = await capturePicture(page);
       await page.evaluate(stop);
       // The first call is sent to the worker, the second waits for the first.
       const results = page.evaluate(
         `Promise.all([photo.toBlob(), photo.toBlob()]).catch((error) => error.code)`,
       );
+      // A silent worker counts as dead after twenty seconds.
+      await page.clock.runFor(SILENCE_MS);
       const photoEvents = await waitForEvents(page, 'backendchange', 2);
       expect(await results).toBe('photo-lost');
       const change = photoEvents.findLast((event) => event.type === 'backendchange');
