@@ -20,7 +20,10 @@ mod noise_model;
 pub use camera_row_set::CameraRowSet;
 pub use error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 #[cfg(feature = "capture")]
-pub use folder::{CaptureFiles, CaptureFolder, DarkFrame, DiskFiles, PhotographRowReader};
+pub use folder::{
+    CaptureFiles, CaptureFolder, DarkFrame, DiskFiles, PhotographRowReader, read_unlisted_pattern,
+    read_unlisted_photo,
+};
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
 pub use folder::{GroundTruth, RELIT_FULL_SCALE};
 pub(crate) use group_ids::{group_count, group_ids};

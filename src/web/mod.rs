@@ -37,7 +37,8 @@ pub use graphics_device::GraphicsDevice;
 pub use photo::Photo;
 #[cfg(feature = "recovery")]
 pub use recovery::{
-    MeasurementBuilder, MeasurementInput, RecoveredTransport, Recovery, TileRecovery,
+    LinearPng, MeasurementBuilder, MeasurementInput, RecoveredTransport, Recovery, TileRecovery,
+    emission_of_codes, read_pattern, read_photograph,
 };
 #[cfg(feature = "cpu")]
 pub use row_range_relighter::{RowRangeRelighter, cpu_kernel};

@@ -3,7 +3,7 @@
  *
  * - relightable-photo.js: the element in one file, for script tags, with its workers and the scripts that it loads
  *   on demand;
- * - index.js, element.js and core.js, which share chunks: for bundlers and import maps;
+ * - index.js, element.js, core.js and recover.js, which share chunks: for bundlers and import maps;
  * - types/, custom-elements.json, and the types of the element in JSX.
  */
 
@@ -119,6 +119,7 @@ await Promise.all([
     entryPoints: {
       'relightable-photo-worker': 'www/src/photo/decode-worker.ts',
       'relightable-photo-relighter': 'www/src/renderers/cpu/relight-worker.ts',
+      'relightable-photo-recovery': 'www/src/recover/recovery-worker.ts',
     },
   }),
   build({
@@ -131,6 +132,7 @@ await Promise.all([
       index: 'www/src/index.ts',
       element: 'www/src/element-entry.ts',
       core: 'www/src/core.ts',
+      recover: 'www/src/recover.ts',
     },
   }),
 ]);

@@ -4,7 +4,7 @@
 //! hundreds can be read in parallel without one of them in memory whole.
 
 use std::fmt::Display;
-use std::io::{BufReader, ErrorKind};
+use std::io::{BufRead, BufReader, ErrorKind, Seek};
 
 use png::{BitDepth, ColorType, Transformations};
 
@@ -23,8 +23,8 @@ pub(super) struct CapturePng<'a, F> {
     files: &'a F,
     /// Its name in the manifest.
     name: &'a str,
-    /// The size it must have.
-    extent: Extent,
+    /// The size it must have, if a manifest says so.
+    extent: Option<Extent>,
     /// The field of the manifest that names it, for messages.
     field: Option<String>,
 }
@@ -34,13 +34,23 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
         Self {
             files,
             name,
-            extent,
+            extent: Some(extent),
             field,
         }
     }
 
-    /// Reads an 8-bit pattern; `emission` is that of each code.
-    pub fn read_pattern(&self, emission: &[f64; 256]) -> Result<Pattern, CaptureError> {
+    /// A PNG that no manifest lists.
+    pub fn unlisted(files: &'a F, name: &'a str) -> Self {
+        Self {
+            files,
+            name,
+            extent: None,
+            field: None,
+        }
+    }
+
+    /// Reads an 8-bit pattern and its size; `emission` is that of each code.
+    pub fn read_pattern(&self, emission: &[f64; 256]) -> Result<(Extent, Pattern), CaptureError> {
         // Some programs store black and white in one bit, or in a palette.
         let mut reader = self.open(Transformations::EXPAND)?;
         let channels = match reader.output_color_type() {
@@ -48,26 +58,29 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
             (ColorType::Rgb, BitDepth::Eight) => CHANNELS,
             other => return Err(self.error(CaptureErrorKind::PatternType(sample_type(other)))),
         };
-        let mut codes = vec![0; channels * self.extent.area()];
+        let extent = extent_of(&reader);
+        let mut codes = vec![0; channels * extent.area()];
         let decoded = reader.next_frame(&mut codes);
         decoded.map_err(|e| self.unreadable(e))?;
         let emit = |code: &u8| emission[usize::from(*code)] as f32;
         let plane = |c| codes.iter().skip(c).step_by(channels).map(emit).collect();
-        Ok(match channels {
+        let pattern = match channels {
             1 => Pattern::Grey(plane(0)),
             _ => Pattern::Rgb(std::array::from_fn(plane)),
-        })
+        };
+        Ok((extent, pattern))
     }
 
-    /// The codes of a 16-bit photograph, row by row.
-    pub fn read_rgb16(self) -> Result<Vec<[u16; CHANNELS]>, CaptureError> {
-        let mut codes = Vec::with_capacity(self.extent.area());
+    /// The size and the codes of a 16-bit photograph, row by row.
+    pub fn read_rgb16(self) -> Result<(Extent, Vec<[u16; CHANNELS]>), CaptureError> {
         let mut rows = self.open_rgb16()?;
+        let extent = extent_of(&rows.reader);
+        let mut codes = Vec::with_capacity(extent.area());
         while let Some(row) = rows.next()? {
             codes.extend(row);
         }
         rows.finish()?;
-        Ok(codes)
+        Ok((extent, codes))
     }
 
     /// Opens a 16-bit photograph to be read row by row.
@@ -92,11 +105,12 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
         let mut decoder = png::Decoder::new(BufReader::with_capacity(READ_BYTES, file));
         decoder.set_transformations(transformations);
         let reader = decoder.read_info().map_err(|e| self.unreadable(e))?;
-        let found = Extent::new(reader.info().width, reader.info().height);
-        let expected = self.extent;
-        match found == expected {
-            true => Ok(reader),
-            false => Err(self.error(CaptureErrorKind::WrongExtent { found, expected })),
+        let found = extent_of(&reader);
+        match self.extent {
+            Some(expected) if found != expected => {
+                Err(self.error(CaptureErrorKind::WrongExtent { found, expected }))
+            }
+            _ => Ok(reader),
         }
     }
 
@@ -112,6 +126,10 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
             problem,
         }
     }
+}
+
+fn extent_of<R: BufRead + Seek>(reader: &png::Reader<R>) -> Extent {
+    Extent::new(reader.info().width, reader.info().height)
 }
 
 /// For instance "8-bit grey with alpha".

@@ -27,7 +27,30 @@ use super::manifest::{GrayCodeShot, Manifest};
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
 use crate::calibrate::GrayCodePhotos;
-use crate::transport::{CHANNELS, Correspondence};
+use crate::transport::{CHANNELS, Correspondence, Extent};
+
+/// Reads the size and the codes of a photograph that no manifest lists.
+///
+/// # Errors
+/// If it is missing or not a 16-bit PNG.
+pub fn read_unlisted_photo<F: CaptureFiles>(
+    files: &F,
+    name: &str,
+) -> Result<(Extent, Vec<[u16; CHANNELS]>), CaptureError> {
+    CapturePng::unlisted(files, name).read_rgb16()
+}
+
+/// Reads the size and the emission of a pattern that no manifest lists; `emission` is that of each code.
+///
+/// # Errors
+/// If it is missing or not an 8-bit PNG.
+pub fn read_unlisted_pattern<F: CaptureFiles>(
+    files: &F,
+    name: &str,
+    emission: &[f64; 256],
+) -> Result<(Extent, Pattern), CaptureError> {
+    CapturePng::unlisted(files, name).read_pattern(emission)
+}
 
 /// A capture folder with its checked manifest.
 #[derive(Debug)]
@@ -159,9 +182,9 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             Some(name) => {
                 let field = Some("dark".to_owned());
                 let file = CapturePng::new(&self.files, name, camera.extent(), field);
-                let codes = file.read_rgb16()?.into_iter();
+                let (_, codes) = file.read_rgb16()?;
                 let linear = |code| camera.linear(code, 1.0);
-                codes.map(|codes| codes.map(linear)).collect()
+                codes.into_iter().map(|codes| codes.map(linear)).collect()
             }
         };
         let code = 1.0 / (camera.white - camera.black);
@@ -209,7 +232,8 @@ impl<F: CaptureFiles> CaptureFolder<F> {
     pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
         let name = &self.manifest.shots[i].pattern;
         let (light, field) = (self.manifest.light.extent(), format!("shots[{i}].pattern"));
-        CapturePng::new(&self.files, name, light, Some(field)).read_pattern(&self.emission)
+        let file = CapturePng::new(&self.files, name, light, Some(field));
+        Ok(file.read_pattern(&self.emission)?.1)
     }
 
     /// Measurements of `shots` without any camera rows yet. Their noise has only its floor.

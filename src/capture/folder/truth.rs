@@ -110,7 +110,8 @@ impl GroundTruth {
     /// If its picture cannot be read.
     pub fn light(&self, name: &str) -> Result<Pattern, CaptureError> {
         let name = format!("light_{name}.png");
-        CapturePng::new(&self.files, &name, self.light_plane, None).read_pattern(&self.emission)
+        let file = CapturePng::new(&self.files, &name, self.light_plane, None);
+        Ok(file.read_pattern(&self.emission)?.1)
     }
 
     /// The true picture under light `name`, `[N]`, in units of the measurement.
@@ -120,7 +121,7 @@ impl GroundTruth {
     pub fn relit(&self, name: &str) -> Result<Vec<[f64; CHANNELS]>, CaptureError> {
         let name = format!("relit_{name}.png");
         let file = CapturePng::new(&self.files, &name, self.camera, None);
-        let codes = file.read_rgb16()?.into_iter();
+        let codes = file.read_rgb16()?.1.into_iter();
         let linear = |code| f64::from(code) / RELIT_FULL_SCALE;
         Ok(codes.map(|codes| codes.map(linear)).collect())
     }

@@ -6,12 +6,14 @@
 
 mod capture_files;
 mod error;
+mod linear_png;
 mod measurement_input;
 mod progress;
 mod recovered;
 mod recovery_job;
 mod tile_recovery;
 
+pub use linear_png::{LinearPng, emission_of_codes, read_pattern, read_photograph};
 pub use measurement_input::{MeasurementBuilder, MeasurementInput};
 pub use recovered::RecoveredTransport;
 pub use recovery_job::Recovery;

@@ -1,6 +1,6 @@
 /** `<relightable-photo>`: the public interface. The class delegates to `ElementController`. */
 
-import { moduleFolder, setModuleFolder } from '../engine/wasm-loader.js';
+import { moduleFolder, setModuleFolder, toModuleFolder } from '../engine/wasm-loader.js';
 import { addTranslation, type Translation } from '../i18n/translations.js';
 import type { TransitionOptions } from '../input/transitions.js';
 import type { PhotoError } from '../shared/errors.js';
@@ -90,7 +90,7 @@ export class RelightablePhotoElement extends Base {
     return moduleFolder;
   }
   static set wasmUrl(url: string | URL | null) {
-    setModuleFolder(url ? new URL(url, globalThis.document?.baseURI).href : null);
+    setModuleFolder(url ? toModuleFolder(url) : null);
   }
 
   /**

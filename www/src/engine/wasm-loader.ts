@@ -35,8 +35,17 @@ const SIMD_PROBE = new Uint8Array([
   11,
 ]);
 
+export function hasSimd(): boolean {
+  return WebAssembly.validate(SIMD_PROBE);
+}
+
 /** The folder of the modules, with a slash at its end; `null` if they lie beside this script. */
 export let moduleFolder: string | null = null;
+
+/** The absolute address of a folder. */
+export function toModuleFolder(url: string | URL): string {
+  return new URL(url, globalThis.document?.baseURI).href;
+}
 
 /** Sets the folder of modules that are started from now on, with or without a slash at its end. */
 export function setModuleFolder(url: string | null): void {
@@ -77,7 +86,7 @@ async function startModule<Module>(
   fetchModule: FetchWasm,
 ): Promise<Module> {
   // Without SIMD support, a SIMD build does not even compile.
-  const scalarBuild = scalar && !WebAssembly.validate(SIMD_PROBE) ? scalar : null;
+  const scalarBuild = scalar && !hasSimd() ? scalar : null;
   const url =
     moduleFolder === null
       ? (scalarBuild ?? simd)()

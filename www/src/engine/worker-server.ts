@@ -8,15 +8,18 @@ import { moduleFolder, setModuleFolder } from './wasm-loader.js';
 export interface WorkerService<Task, Ready, Result> {
   /** Sent to the page with the news that the worker has started. */
   readonly ready: Ready;
-  /** Does one task; gives its result and the buffers to transfer with it. */
-  handle(task: Task): readonly [Result, Transferable[]];
+  /** Does one task; gives its result and the buffers to transfer with it. A long task reports the steps it has done. */
+  handle(task: Task, onProgress: (steps: number) => void): readonly [Result, Transferable[]];
 }
 
-/** `null` if the page may not have workers. `create` calls `new Worker` with a literal address, for bundlers. */
-export function startWorker(create: () => Worker): Worker | null {
+/**
+ * `null` if the page may not have workers. `create` calls `new Worker` with a literal address, for bundlers. The worker
+ * finds its module in `folder`, or beside its script.
+ */
+export function startWorker(create: () => Worker, folder = moduleFolder): Worker | null {
   try {
     const worker = createTrustedWorker(create);
-    worker.postMessage(moduleFolder);
+    worker.postMessage(folder);
     return worker;
   } catch {
     return null;
@@ -42,7 +45,8 @@ export function serve<Task, Ready, Result>(
     setModuleFolder(modules);
     const service = await setUp();
     const answer = ({ id, task }: WorkerRequest<Task>): void => {
-      const [result, transfer] = service.handle(task);
+      const onProgress = (steps: number) => send({ kind: 'progress', id, steps });
+      const [result, transfer] = service.handle(task, onProgress);
       send({ kind: 'done', id, result }, transfer);
     };
     scope.onmessage = ({ data }) => void orReport(() => answer(data));

@@ -1,12 +1,12 @@
 /** The script of a worker that decodes one photograph after another. */
 
 import { loadDecoder } from '../engine/core-modules.js';
-import type { DecodedPhoto, Decoder, DecoderModule } from '../engine/wasm-exports.js';
+import type { Decoder, DecoderModule } from '../engine/wasm-exports.js';
 import { serve } from '../engine/worker-server.js';
 import { toPhotoError } from '../shared/errors.js';
 import { decoderState } from './main-thread-decoder.js';
-import { describePhoto, type TransferredTile } from './types.js';
-import type { DecodeResult, DecodeTask, TransferredPhoto } from './worker-decoder.js';
+import { takeOut } from './types.js';
+import type { DecodeResult, DecodeTask } from './worker-decoder.js';
 
 /** Ended by `finish`. */
 let decoder: Decoder | null = null;
@@ -35,15 +35,6 @@ function answer(
     const { code, message } = toPhotoError(thrown);
     return { error: { code, message } };
   }
-}
-
-/** Moves a photograph out of the module's memory. */
-function takeOut(photo: DecodedPhoto): TransferredPhoto {
-  const descriptor = describePhoto(photo);
-  const takeTile = (_: unknown, index: number) => photo.takeTile(index) as TransferredTile;
-  const tiles = Array.from({ length: descriptor.tiles }, takeTile);
-  photo.free();
-  return { descriptor, tiles };
 }
 
 serve(async () => {

@@ -13,6 +13,27 @@ export interface PhotoDescriptor
   readonly basis: Float32Array;
 }
 
+/** A photograph on its way from a worker to the page. */
+export interface TransferredPhoto {
+  readonly descriptor: PhotoDescriptor;
+  readonly tiles: TransferredTile[];
+}
+
+/** A photograph that is not a file, for the element's property `photograph`. */
+export interface PhotographSource {
+  /** Gives the photograph, with tiles of its own at each call. Rejects once `signal` is aborted. */
+  load(options: { readonly signal: AbortSignal }): Promise<TransferredPhoto>;
+}
+
+/** Moves a photograph out of a module's memory. */
+export function takeOut(photo: DecodedPhoto): TransferredPhoto {
+  const descriptor = describePhoto(photo);
+  const takeTile = (_: unknown, index: number) => photo.takeTile(index) as TransferredTile;
+  const tiles = Array.from({ length: descriptor.tiles }, takeTile);
+  photo.free();
+  return { descriptor, tiles };
+}
+
 export function describePhoto(photo: DecodedPhoto): PhotoDescriptor {
   const { width, height, lightWidth, lightHeight, decodedBytes, metadata, tiles, tileSide } = photo;
   const [geometry, basis] = [photo.packGeometry(), photo.packBasis()];

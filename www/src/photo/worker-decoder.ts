@@ -5,19 +5,13 @@ import { callLater } from '../shared/promises.js';
 import { type WatchdogLimits, WorkerClient, type WorkerLike } from '../shared/worker-client.js';
 import { completenessOf, type DecoderProgress, type PhotoDecoder } from './photo-decoder.js';
 import { LoadedPhotograph } from './photograph.js';
-import type { PhotoDescriptor, TransferredTile } from './types.js';
+import type { TransferredPhoto } from './types.js';
 
 export type DecodeTask =
   | { readonly kind: 'feed'; readonly offset: number; readonly bytes: Uint8Array }
   /** Starts a file. */
   | { readonly kind: 'open' }
   | { readonly kind: 'preview' | 'finish' };
-
-/** A photograph on its way from the worker to the page. */
-export interface TransferredPhoto {
-  readonly descriptor: PhotoDescriptor;
-  readonly tiles: TransferredTile[];
-}
 
 export type DecodeResult =
   /** Of `open` and `feed`. */

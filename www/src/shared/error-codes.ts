@@ -122,6 +122,12 @@ export interface ScriptFaults {
    */
   'csp-wasm': true;
   /**
+   * The browser or device has no WebAssembly SIMD, which recovery in the page needs.
+   * @visitor what the page shows; the script gets the error.
+   * @remedy Use a current browser, or `ltm-export recover`.
+   */
+  'wasm-simd': true;
+  /**
    * The script of the controls could not be loaded. A missing translation is not reported: its texts are in English.
    * @visitor the picture without controls.
    * @remedy Copy the whole `dist` folder, and do not rename its files: the scripts load each other by name.
@@ -247,6 +253,88 @@ export interface DrawingFaults {
   'backend-lost': true;
 }
 
+/** Recovery in the page */
+export interface RecoveryFaults {
+  /**
+   * The folder has no `capture.json`, or a field of it is missing or invalid.
+   * @visitor what the page shows, as for all errors of `recover()`.
+   * @remedy Give the folder that holds `capture.json`; the message names the field: [capture.md](capture.md).
+   */
+  'capture-manifest': true;
+  /**
+   * A file that `capture.json` names is missing, damaged or cannot be read.
+   * @visitor what the page shows.
+   * @remedy Add the file, correct its name, or export or copy it again.
+   */
+  'capture-file': true;
+  /**
+   * A picture has another size than the others, or than `capture.json` says.
+   * @visitor what the page shows.
+   * @remedy All photographs must have the camera's size, all patterns that of the light plane.
+   */
+  'capture-size': true;
+  /**
+   * A photograph is not a 16-bit linear RGB PNG without interlacing.
+   * @visitor what the page shows.
+   * @remedy Export it again from raw. 8-bit photographs cannot be repaired.
+   */
+  'capture-photograph': true;
+  /**
+   * A pattern is not an 8-bit grey or RGB PNG.
+   * @visitor what the page shows.
+   * @remedy Convert it.
+   */
+  'capture-pattern': true;
+  /**
+   * A setting or option of `recover()` is invalid.
+   * @visitor what the page shows.
+   * @remedy Correct the value that the message names: [recover.md](recover.md).
+   */
+  'recover-options': true;
+  /**
+   * There are too few patterns, or fewer shots than were asked for.
+   * @visitor what the page shows.
+   * @remedy Photograph the object under more patterns, about 80 for a good result.
+   */
+  'recover-patterns': true;
+  /**
+   * The camera, the light plane or the window is too large or has no extent.
+   * @visitor what the page shows.
+   * @remedy Correct the size that the message names.
+   */
+  'recover-geometry': true;
+  /**
+   * The correspondence between camera pixels and light elements is missing, unclear or wrong.
+   * @visitor what the page shows.
+   * @remedy Photograph the Gray code again with more light, or give the correspondence.
+   */
+  'recover-correspondence': true;
+  /**
+   * The photographs show no light from the patterns.
+   * @visitor what the page shows.
+   * @remedy Check the black level, the exposure, and that each photograph shows its own pattern.
+   */
+  'recover-no-signal': true;
+  /**
+   * Photographs do not match the patterns that they are listed with.
+   * @visitor what the page shows.
+   * @remedy Correct these shots or take them out. If there are many, the correspondence may be mirrored.
+   */
+  'recover-mismatch': true;
+  /**
+   * Nearly all of the picture is saturated.
+   * @visitor what the page shows.
+   * @remedy Photograph with less exposure, or add shots with less.
+   */
+  'recover-overexposed': true;
+  /**
+   * The recovery takes more memory than its limit, or than the browser has.
+   * @visitor what the page shows.
+   * @remedy Recover with fewer camera pixels, photographs or workers, raise `memoryLimit`, or use `ltm-export`.
+   */
+  'recover-memory': true;
+}
+
 /** Any code; a newer WebAssembly module may add some. */
 export type ErrorCode =
   | keyof PageFaults
@@ -255,4 +343,5 @@ export type ErrorCode =
   | keyof FileFaults
   | keyof LightFaults
   | keyof DrawingFaults
+  | keyof RecoveryFaults
   | (string & {});

@@ -20,6 +20,8 @@ export interface WorkerRequest<Task> {
 export type WorkerResponse<Ready, Result> =
   /** The result of a task; that of `START_ID` says that the worker has started. */
   | { readonly kind: 'done'; readonly id: number; readonly result: Ready | Result }
+  /** A task is still in progress: so many of its steps are done. */
+  | { readonly kind: 'progress'; readonly id: number; readonly steps: number }
   /** The worker could not start, or could not do a task: its state is undefined from now on. */
   | { readonly kind: 'failed'; readonly message: string };
 
@@ -47,7 +49,11 @@ export const START_ID = 0;
 interface PendingRequest<Result> {
   readonly resolve: (result: Result) => void;
   readonly reject: (error: PhotoError) => void;
+  readonly onProgress?: OnProgress | undefined;
 }
+
+/** Gets the number of steps that are done of a long task. */
+type OnProgress = (steps: number) => void;
 
 export class WorkerClient<Task, Ready, Result> {
   /** Settles when the worker has started, or cannot. */
@@ -82,13 +88,13 @@ export class WorkerClient<Task, Ready, Result> {
    * Sends a task; the worker does tasks in order. Rejects with `worker-unavailable` if the worker has failed, or fails
    * before it answers, and with the browser's error if it cannot send the message; then nothing has been transferred.
    */
-  request(task: Task, transfer: Transferable[] = []): Promise<Result> {
+  request(task: Task, transfer: Transferable[] = [], onProgress?: OnProgress): Promise<Result> {
     return new Promise((resolve, reject) => {
       if (this.failure) throw this.failure;
       const id = this.#lastId + 1;
       this.worker.postMessage({ id, task }, transfer);
       this.#lastId = id;
-      this.#pending.set(id, { resolve, reject });
+      this.#pending.set(id, { resolve, reject, onProgress });
       if (this.#pending.size === 1) this.#watch(this.options.limits.maxChecks);
     });
   }
@@ -105,8 +111,11 @@ export class WorkerClient<Task, Ready, Result> {
     }
     this.hasStarted = true;
     const pending = this.#pending.get(response.id);
-    this.#pending.delete(response.id);
-    pending?.resolve(response.result as never);
+    if (response.kind === 'progress') pending?.onProgress?.(response.steps);
+    else {
+      this.#pending.delete(response.id);
+      pending?.resolve(response.result as never);
+    }
     if (this.#pending.size > 0) this.#watch(this.options.limits.maxChecks);
     else clearInterval(this.#watchdog);
   }

@@ -1,0 +1,128 @@
+/**
+ * The exports of the WebAssembly module of recovery. `tests/browser/engine-contract.ts` compares these types with those
+ * of wasm-bindgen. All pictures are linear, row by row.
+ */
+
+import type { DecodedPhoto, Freeable } from './wasm-exports.js';
+
+/** Files that a worker reads within a call. Names are relative to the capture folder. */
+export interface PageFiles {
+  /** Bytes of the file; `undefined` if there is no such file. */
+  size(name: string): number | undefined;
+  /** Throws if the browser cannot read the file. */
+  read(name: string, offset: number, length: number): Uint8Array;
+}
+
+/** Gets the number of jobs that are done. */
+type OnJob = (jobs: number) => void;
+
+/** The measurements of a recovery. */
+export interface MeasurementInput extends Freeable {
+  readonly width: number;
+  readonly height: number;
+  readonly shotsUsed: Uint32Array;
+  readonly unknownFields: string[];
+  /** Six numbers, row by row. */
+  readonly correspondence: Float64Array;
+}
+
+/** Takes patterns and photographs one by one. */
+export interface MeasurementBuilder extends Freeable {
+  /** Subtracted from photographs that are added later. */
+  setDark(photograph: Float32Array): void;
+  addShot(pattern: Float32Array, photograph: Float32Array, exposure: number): void;
+  setCorrespondence(affine: Float64Array): void;
+  addGrayCode(isOfRows: boolean, bit: number, inverted: boolean, photograph: Float32Array): void;
+  /** Ends the builder, also if it throws. */
+  finish(title: string, creator: string, rights: string): MeasurementInput;
+}
+
+/** A recovery that is prepared. */
+export interface Recovery extends Freeable {
+  readonly tiles: number;
+  readonly tileColumns: number;
+  readonly window: number;
+  readonly rank: number | undefined;
+  readonly expectedSnr: number | undefined;
+  readonly saturatedSamples: number;
+  readonly overexposedPixels: number;
+  readonly warnings: string[];
+  /** For `TileRecovery` in another worker. */
+  pack(): Uint8Array;
+  /** The first camera row that the tile rows from `first` to `end` depend on. */
+  firstRow(first: number): number;
+  /** All rows that they depend on, of all photographs. */
+  packRows(first: number, end: number): Float32Array;
+  recoverTile(index: number): void;
+  putTile(index: number, record: Uint8Array): void;
+  encode(
+    snr: number | undefined,
+    maxBytes: number | undefined,
+    lossless: boolean,
+    onJob: OnJob,
+  ): Uint8Array;
+  transport(): RecoveredTransport;
+}
+
+/** Recovers tiles for a `Recovery` in another worker. */
+export interface TileRecovery extends Freeable {
+  setRows(first: number, samples: Float32Array): void;
+  /** The record for `putTile`. */
+  recoverTile(index: number): Uint8Array;
+}
+
+/** The recovered light transport matrix, as browsers relight it. */
+export interface RecoveredTransport extends Freeable {
+  readonly lightWidth: number;
+  readonly lightHeight: number;
+  photo(): DecodedPhoto;
+  /** Linear R, G and B of the picture under linear R, G and B of all light elements. */
+  relight(light: Float32Array): Float32Array;
+  /** Energy of the true picture, and of the difference of the picture under its light. */
+  pictureError(light: Float32Array, truth: Float32Array): Float64Array;
+  /** The same, summed over the shots of a folder that are not in `used`. */
+  heldOutError(files: PageFiles, used: Uint32Array): Float64Array;
+  transportFunction(x: number, y: number): Float32Array;
+  windowOrigin(x: number, y: number): Int32Array;
+  pointScatteringFunction(u: number, v: number): Float32Array;
+}
+
+/** A PNG that is decoded. */
+export interface LinearPng extends Freeable {
+  readonly width: number;
+  readonly height: number;
+  /** Three values for each pixel of a photograph; one or three for each element of a pattern. */
+  readonly data: Float32Array;
+}
+
+export interface RecoveryModule {
+  /** Gives the started module's exports. */
+  default(): Promise<{ readonly memory: Pick<WebAssembly.Memory, 'buffer'> }>;
+  MeasurementInput: {
+    readFolder(files: PageFiles, count: number | undefined, onShot: OnJob): MeasurementInput;
+  };
+  MeasurementBuilder: {
+    new (
+      width: number,
+      height: number,
+      lightWidth: number,
+      lightHeight: number,
+      quantum: number,
+    ): MeasurementBuilder;
+  };
+  Recovery: {
+    /** Ends the input, also if it throws. */
+    prepare(
+      input: MeasurementInput,
+      method: string,
+      basis: string | undefined,
+      window: number | undefined,
+      onJob: OnJob,
+    ): Recovery;
+  };
+  readPhotograph(files: PageFiles, name: string, black: number, white: number): LinearPng;
+  readPattern(files: PageFiles, name: string, gamma: number): LinearPng;
+  /** The emission of the codes 0 to 255. */
+  emissionOfCodes(gamma: number): Float32Array;
+  TileRecovery: { new (packed: Uint8Array): TileRecovery };
+}

@@ -1,0 +1,203 @@
+/** The coordinator of a recovery, in a worker: reads, prepares, keeps the tiles, and answers questions about the result. */
+
+import type {
+  MeasurementBuilder,
+  MeasurementInput,
+  RecoveredTransport,
+  Recovery,
+  RecoveryModule,
+} from '../engine/recovery-exports.js';
+import { takeOut } from '../photo/types.js';
+import { pageFiles } from './page-files.js';
+import { PictureReader } from './picture-reader.js';
+import {
+  type CoordinatorCalls,
+  DEFAULT_GAMMA,
+  type InputSummary,
+  MAX_CODE,
+  type PackedRows,
+  type PictureError,
+  type PictureSize,
+  type PicturesHeader,
+  type PreparationSettings,
+  type PreparationSummary,
+  type RecoverySummary,
+  type SentPicture,
+} from './protocol.js';
+import type { Correspondence, FileQuality, TransportFunction } from './types.js';
+
+/** Of pictures that are compared with a photograph that was recovered from a folder. */
+const DEFAULT_CODES = { lightGamma: DEFAULT_GAMMA, black: 0, white: MAX_CODE };
+
+export class Coordinator implements CoordinatorCalls {
+  #header: PicturesHeader | null = null;
+  #reader: PictureReader | null = null;
+  #dark: Float32Array | null = null;
+  #files: ReadonlyMap<string, Blob> = new Map();
+  #builder: MeasurementBuilder | null = null;
+  #input: MeasurementInput | null = null;
+  #shotsUsed: readonly number[] = [];
+  #recovery: Recovery | null = null;
+  #transport: RecoveredTransport | null = null;
+  #camera: PictureSize = { width: 0, height: 0 };
+  #light: PictureSize = { width: 0, height: 0 };
+
+  /** `report` tells the page the steps of the call in progress. */
+  constructor(
+    private readonly module: RecoveryModule,
+    private readonly report: (steps: number) => void,
+  ) {}
+
+  readFolder(files: ReadonlyMap<string, Blob>, shots: number | undefined): InputSummary {
+    this.#files = files;
+    const { MeasurementInput } = this.module;
+    return this.#setInput(MeasurementInput.readFolder(pageFiles(files), shots, this.report));
+  }
+
+  beginPictures(header: PicturesHeader): void {
+    const { width, height, lightWidth, lightHeight, quantum } = header;
+    const { MeasurementBuilder } = this.module;
+    this.#header = header;
+    this.#reader = new PictureReader(this.module, header);
+    this.#camera = { width, height };
+    this.#light = { width: lightWidth, height: lightHeight };
+    this.#builder = new MeasurementBuilder(width, height, lightWidth, lightHeight, quantum);
+  }
+
+  setDark(photograph: SentPicture): void {
+    this.#dark = this.#readPhotograph(photograph, 'the dark photograph');
+    existing(this.#builder).setDark(this.#dark);
+  }
+
+  setCorrespondence(correspondence: Correspondence): void {
+    existing(this.#builder).setCorrespondence(Float64Array.from(correspondence.flat()));
+  }
+
+  addGrayCode(axis: 'x' | 'y', bit: number, inverted: boolean, photograph: SentPicture): void {
+    const name = `the Gray code photograph of axis ${axis}, bit ${bit}, inverted ${inverted}`;
+    const samples = this.#readPhotograph(photograph, name);
+    existing(this.#builder).addGrayCode(axis === 'y', bit, inverted, samples);
+  }
+
+  addShot(index: number, pattern: SentPicture, photograph: SentPicture, exposure: number): void {
+    const emission = existing(this.#reader).pattern(pattern, `pattern ${index}`, this.#light);
+    const samples = this.#readPhotograph(photograph, `photograph ${index}`);
+    existing(this.#builder).addShot(emission, samples, exposure);
+  }
+
+  finishPictures(): InputSummary {
+    const builder = existing(this.#builder);
+    const { title, creator, rights } = existing(this.#header);
+    this.#builder = null;
+    return this.#setInput(builder.finish(title, creator, rights));
+  }
+
+  prepare({ method, basis, window }: PreparationSettings): PreparationSummary {
+    const input = existing(this.#input);
+    this.#input = null;
+    const { Recovery } = this.module;
+    this.#recovery = Recovery.prepare(input, method, basis, window, this.report);
+    const { tiles, tileColumns, window: side, rank, expectedSnr } = this.#recovery;
+    return { tiles, tileColumns, window: side, rank, expectedSnr };
+  }
+
+  pack(): Uint8Array {
+    return existing(this.#recovery).pack();
+  }
+
+  packRows(tileRow: number): PackedRows {
+    const recovery = existing(this.#recovery);
+    const samples = recovery.packRows(tileRow, tileRow + 1);
+    return { first: recovery.firstRow(tileRow), samples };
+  }
+
+  recoverTile(tile: number): void {
+    existing(this.#recovery).recoverTile(tile);
+  }
+
+  putTile(tile: number, record: Uint8Array): void {
+    existing(this.#recovery).putTile(tile, record);
+  }
+
+  finish(): RecoverySummary {
+    const recovery = existing(this.#recovery);
+    this.#transport = recovery.transport();
+    const { lightWidth, lightHeight } = this.#transport;
+    this.#light = { width: lightWidth, height: lightHeight };
+    const { saturatedSamples, overexposedPixels, warnings } = recovery;
+    return { lightWidth, lightHeight, saturatedSamples, overexposedPixels, warnings };
+  }
+
+  encode(quality: FileQuality | undefined): Uint8Array<ArrayBuffer> {
+    const { snr, maxBytes } = Object(quality) as { snr?: number; maxBytes?: number };
+    const isLossless = quality === 'lossless';
+    const bytes = existing(this.#recovery).encode(snr, maxBytes, isLossless, this.report);
+    return bytes as Uint8Array<ArrayBuffer>;
+  }
+
+  photo() {
+    return takeOut(existing(this.#transport).photo());
+  }
+
+  relight(light: Float32Array): Float32Array {
+    return existing(this.#transport).relight(light);
+  }
+
+  transportFunction(x: number, y: number): TransportFunction {
+    const transport = existing(this.#transport);
+    const values = transport.transportFunction(x, y);
+    const [u = 0, v = 0] = transport.windowOrigin(x, y);
+    return { origin: [u, v], values };
+  }
+
+  pointScatteringFunction(u: number, v: number): Float32Array {
+    return existing(this.#transport).pointScatteringFunction(u, v);
+  }
+
+  evaluatePair(
+    index: number,
+    light: SentPicture,
+    photograph: SentPicture,
+    exposure: number,
+  ): PictureError {
+    const rgb = existing(this.#reader).light(light, `the light of pair ${index}`, this.#light);
+    const samples = this.#readPhotograph(photograph, `the photograph of pair ${index}`);
+    const dark = this.#dark;
+    const truth = samples.map((sample, i) => sample / exposure - (dark?.[i] ?? 0));
+    return energies(existing(this.#transport).pictureError(rgb, truth));
+  }
+
+  evaluateHeldOut(): PictureError {
+    const files = pageFiles(this.#files);
+    const used = Uint32Array.from(this.#shotsUsed);
+    return energies(existing(this.#transport).heldOutError(files, used));
+  }
+
+  #setInput(input: MeasurementInput): InputSummary {
+    const { width, height, unknownFields } = input;
+    const [a, b, c, d, e, f] = input.correspondence as unknown as number[] & { length: 6 };
+    this.#input = input;
+    this.#camera = { width, height };
+    this.#shotsUsed = [...input.shotsUsed];
+    this.#reader ??= new PictureReader(this.module, DEFAULT_CODES);
+    const correspondence = [
+      [a, b, c],
+      [d, e, f],
+    ] as unknown as Correspondence;
+    return { width, height, correspondence, shotsUsed: this.#shotsUsed, unknownFields };
+  }
+
+  #readPhotograph(photograph: SentPicture, name: string): Float32Array {
+    return existing(this.#reader).photograph(photograph, name, this.#camera);
+  }
+}
+
+function energies([signal = 0, error = 0]: Float64Array): PictureError {
+  return { signal, error };
+}
+
+/** What an earlier call has made. */
+function existing<T>(value: T | null): T {
+  if (value === null) throw new Error('The calls of a recovery came in another order.');
+  return value;
+}

@@ -1,0 +1,97 @@
+/** What a recovery takes: memory of all workers, and time. Measured, see `docs/recover.md`. */
+
+import { PhotoError } from '../shared/errors.js';
+import type { StageSeconds } from './progress-tracker.js';
+import type { PictureSize } from './protocol.js';
+import type { RecoverOptions, RecoveryEstimate, RecoverySettings, RecoverySize } from './types.js';
+
+export const DEFAULT_WINDOW = 15;
+/** The widest window that `auto` tries. */
+const MAX_AUTO_WINDOW = 31;
+const MAX_DEFAULT_WORKERS = 4;
+/** Camera pixels along a side of a recovered tile, and around it. */
+const TILE_SIDE = 32;
+const HALO = 8;
+const PIXEL_BYTES = 12;
+
+const MAX_DEFAULT_MEMORY_BYTES = 2 ** 30;
+/** Share of the device's memory. */
+const MEMORY_SHARE = 1 / 4;
+
+/** `deviceMemory` is in GiB, up to 8, and known in some browsers. */
+type DeviceNavigator = { readonly deviceMemory?: number; readonly hardwareConcurrency?: number };
+
+export function defaultWorkers(): number {
+  const { hardwareConcurrency = 1 } = (globalThis.navigator ?? {}) as DeviceNavigator;
+  return Math.max(1, Math.min(MAX_DEFAULT_WORKERS, hardwareConcurrency));
+}
+
+export function defaultMemoryLimit(): number {
+  const { deviceMemory = 8 } = (globalThis.navigator ?? {}) as DeviceNavigator;
+  return Math.min(MAX_DEFAULT_MEMORY_BYTES, MEMORY_SHARE * deviceMemory * 2 ** 30);
+}
+
+/** What a recovery of this size takes, before it starts. */
+export function estimateRecovery(
+  size: RecoverySize,
+  settings: RecoverySettings = {},
+  options: Pick<RecoverOptions, 'workers'> = {},
+): RecoveryEstimate {
+  const seconds = stageSeconds(size, settings, options).reduce((sum, [, time]) => sum + time, 0);
+  return { memoryBytes: memoryBytes(size, settings, options), seconds };
+}
+
+function windowArea({ window = DEFAULT_WINDOW }: RecoverySettings): number {
+  return (window === 'auto' ? MAX_AUTO_WINDOW : window) ** 2;
+}
+
+function memoryBytes(
+  { width, height, lightWidth, lightHeight, photographs }: RecoverySize,
+  settings: RecoverySettings,
+  { workers = defaultWorkers() }: Pick<RecoverOptions, 'workers'>,
+): number {
+  const area = windowArea(settings);
+  const pixels = width * height;
+  const tile = Math.min(pixels, TILE_SIDE ** 2);
+  const rows = Math.min(height, TILE_SIDE + 2 * HALO) * width;
+  // The module, the models of learned recovery, and a tile's equations.
+  const each = 24 * 2 ** 20 + 8 * area * area * 16 + 2 * PIXEL_BYTES * tile * area;
+  const patterns = PIXEL_BYTES * photographs * lightWidth * lightHeight;
+  const coordinator = PIXEL_BYTES * photographs * pixels + patterns + 4 * pixels * area;
+  const others = (workers - 1) * (2 * PIXEL_BYTES * photographs * rows + patterns);
+  return Math.round(workers * each + coordinator + others);
+}
+
+/** Expected time of each stage of `recover`. */
+export function stageSeconds(
+  { width, height, photographs }: RecoverySize,
+  settings: RecoverySettings,
+  { workers = defaultWorkers() }: Pick<RecoverOptions, 'workers'>,
+): StageSeconds {
+  const area = windowArea(settings);
+  const pixels = width * height;
+  const samples = pixels * photographs;
+  const { method = 'learned' } = settings;
+  const perPixel = { learned: 2e-4, nnls: 3e-4, bpdn: 3e-3 }[method] * (area / 225);
+  const preparing = (method === 'learned' ? 1.5 : 0.5) * (area / 225);
+  return [
+    ['reading', 0.1 + 1e-7 * samples],
+    ['preparing', preparing + 2e-8 * samples],
+    ['recovering', 0.1 + (perPixel * pixels) / workers],
+  ];
+}
+
+/** Expected time of `toBlob`. */
+export function encodingSeconds({ width, height }: PictureSize): number {
+  return 0.3 + 5e-5 * width * height;
+}
+
+/** @throws {PhotoError} `recover-memory` if the recovery takes more than the limit */
+export function checkMemory(memoryBytes: number, limit = defaultMemoryLimit()): void {
+  if (memoryBytes <= limit) return;
+  const [needed, allowed] = [memoryBytes, limit].map((bytes) => Math.ceil(bytes / 2 ** 20));
+  const message =
+    `This recovery takes about ${needed} MiB of memory, but the limit is ${allowed} MiB. Recover with fewer camera ` +
+    'pixels, photographs or workers, or raise memoryLimit.';
+  throw new PhotoError('recover-memory', message);
+}

@@ -1,0 +1,86 @@
+/** The script of the workers of a recovery: one is the coordinator, the others recover tiles. */
+
+import { loadRecovery } from '../engine/recovery-module.js';
+import { serve } from '../engine/worker-server.js';
+import { messageOf, toPhotoError } from '../shared/errors.js';
+import { Coordinator } from './coordinator.js';
+import type { RecoveryResult, RecoveryTask, SentError } from './protocol.js';
+import { TileWorker } from './tile-worker.js';
+
+/** Between two reports of progress. */
+const REPORT_INTERVAL_MS = 50;
+/** A module that stops with less memory has another fault than missing memory. */
+const MIN_EXHAUSTED_BYTES = 256 << 20;
+
+type Methods = Record<string, (...args: readonly unknown[]) => unknown>;
+type Memory = Pick<WebAssembly.Memory, 'buffer'>;
+
+/** Reports the steps of the task in progress, not too often. */
+class TaskProgress {
+  send: (steps: number) => void = () => {};
+  #lastMs = 0;
+
+  readonly report = (steps: number): void => {
+    const now = performance.now();
+    if (now - this.#lastMs < REPORT_INTERVAL_MS) return;
+    this.#lastMs = now;
+    this.send(steps);
+  };
+}
+
+function explainStop(thrown: unknown, { buffer }: Memory): SentError {
+  const reason = messageOf(thrown);
+  if (buffer.byteLength < MIN_EXHAUSTED_BYTES) {
+    return { code: 'internal', message: `The recovery stopped: ${reason}.` };
+  }
+  const message =
+    `The recovery stopped with ${Math.round(buffer.byteLength / 2 ** 20)} MiB of memory, probably because the browser ` +
+    `has no more (${reason}). Close other tabs, or recover with fewer camera pixels or photographs.`;
+  return { code: 'recover-memory', message };
+}
+
+/** The memory of all arrays in a result, which is sent without a copy. */
+function buffersOf(value: unknown): Transferable[] {
+  if (ArrayBuffer.isView(value)) return [value.buffer as ArrayBuffer];
+  return value !== null && typeof value === 'object' ? Object.values(value).flatMap(buffersOf) : [];
+}
+
+async function start() {
+  const module = await loadRecovery();
+  const { memory } = await module.default();
+  const progress = new TaskProgress();
+  const coordinator = new Coordinator(module, progress.report);
+  const tileWorker = new TileWorker(module);
+  const answer = ({ method, args }: RecoveryTask): RecoveryResult => {
+    const target = method in tileWorker ? tileWorker : coordinator;
+    try {
+      return { value: (target as unknown as Methods)[method]?.(...args) };
+    } catch (thrown) {
+      if (thrown instanceof WebAssembly.RuntimeError) {
+        return { error: explainStop(thrown, memory), stopped: true };
+      }
+      const { code, message } = toPhotoError(thrown);
+      return { error: { code, message }, stopped: false };
+    }
+  };
+  return (task: RecoveryTask, onProgress: (steps: number) => void): RecoveryResult => {
+    progress.send = onProgress;
+    return answer(task);
+  };
+}
+
+serve(async () => {
+  let error: SentError | null = null;
+  const answer = await start().catch((thrown: unknown) => {
+    const { code, message } = toPhotoError(thrown);
+    error = { code, message };
+    return null;
+  });
+  return {
+    ready: error,
+    handle: (task: RecoveryTask, onProgress) => {
+      const result = answer?.(task, onProgress) ?? { value: undefined };
+      return [result, buffersOf(result)] as const;
+    },
+  };
+});

@@ -1,0 +1,31 @@
+/** Messages of the doubts about a recovery, as the command line's. */
+
+import type { InputSummary, PreparationSummary, RecoverySummary } from './protocol.js';
+import type { RecoveryWarning, RecoveryWarningCode } from './types.js';
+
+export function describeWarnings(
+  { width, height, shotsUsed, unknownFields }: InputSummary,
+  { window, expectedSnr = 0 }: PreparationSummary,
+  { warnings, saturatedSamples, overexposedPixels }: RecoverySummary,
+): RecoveryWarning[] {
+  const samples = 3 * width * height * shotsUsed.length;
+  const percent = ((100 * saturatedSamples) / samples).toFixed(1);
+  const side = `${window}x${window} light elements`;
+  const messages: Record<RecoveryWarningCode, string> = {
+    'low-snr':
+      `The SNR on held-out patterns is only ${expectedSnr.toFixed(1)} dB. Check that the photographs are linear, that ` +
+      'the light was steady and that the correspondence is right. With few patterns, or another method than learned, ' +
+      'it may not get better.',
+    'band-unbounded': `The band is at least as wide as the largest window tried, ${side}; a larger one can be given as window.`,
+    'band-undetermined': `The photographs do not show how wide the band is; a window of ${side} is used, another can be given as window.`,
+    saturation:
+      `${percent} % of the samples are saturated and left out, which is a large share. Check the white level, or ` +
+      'photograph with less exposure.',
+    overexposed:
+      `${overexposedPixels} pixels are saturated in nearly all photographs and will be white under every light. ` +
+      'Photograph with less exposure, or add shots with less.',
+    'unknown-fields': `Unknown fields of capture.json are ignored: ${unknownFields.join(', ')}.`,
+  };
+  const codes = unknownFields.length > 0 ? ['unknown-fields', ...warnings] : warnings;
+  return (codes as RecoveryWarningCode[]).map((code) => ({ code, message: messages[code] }));
+}
