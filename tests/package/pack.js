@@ -25,6 +25,7 @@ const SCRIPTS = [
     '-cpu',
     '-gpu',
     '-relighter',
+    '-recovery',
     '-decoder',
     '-sources',
     '-input',
@@ -32,10 +33,10 @@ const SCRIPTS = [
   ...['fr', 'de', 'it', 'es', 'ja', 'zh', 'zh-hant'].map(
     (language) => `relightable-photo-${language}`,
   ),
-  ...['index', 'element', 'core'],
+  ...['index', 'element', 'core', 'recover'],
 ];
 const CORE_MODULES = ['decoder', 'cpu'];
-const MODULES = [...CORE_MODULES, 'webgl2', 'webgpu'];
+const MODULES = [...CORE_MODULES, 'webgl2', 'webgpu', 'recovery'];
 const BUILDS = [...MODULES, 'decoder_scalar', 'cpu_scalar'];
 
 const EXPECTED = [
@@ -180,6 +181,7 @@ test('importing the class defines no element, importing the package does', () =>
   for (const [specifier, defined] of [
     ['relightable-photo/element', []],
     ['relightable-photo/core', []],
+    ['relightable-photo/recover', []],
     ['relightable-photo', ['relightable-photo']],
     ['relightable-photo/script', ['relightable-photo']],
   ]) {
@@ -221,6 +223,7 @@ test('types resolve under every moduleResolution', () => {
     import { type PhotoInfo, RelightablePhotoElement, type RelightablePhotoEventMap } from 'relightable-photo';
     import { defineRelightablePhoto, PhotoError } from 'relightable-photo/element';
     import type { RelitPicture } from 'relightable-photo/core';
+    import { openCaptureFolder, type PhotographInput, recover } from 'relightable-photo/recover';
     import 'relightable-photo/script';
     import type { RelightablePhotoProps } from 'relightable-photo/jsx';
     const photo = document.querySelector('relightable-photo');
@@ -229,6 +232,13 @@ test('types resolve under every moduleResolution', () => {
     export const props: RelightablePhotoProps = { src: '/window.ltm', exposure: 1 };
     export type { RelitPicture, RelightablePhotoEventMap };
     export { defineRelightablePhoto, PhotoError };
+    export async function show(zip: Blob, photographs: PhotographInput[]): Promise<Blob> {
+      const recovered = await recover({ folder: await openCaptureFolder(zip) }, { window: 'auto' });
+      if (photo) photo.photograph = recovered;
+      const light = { data: new Float32Array(4), width: 2, height: 2 };
+      await recovered.evaluate(photographs.map((photograph) => ({ light, photograph })));
+      return recovered.toBlob({ snr: 30 });
+    }
     // @ts-expect-error: there is no such property
     photo?.nothing;
   `;

@@ -26,6 +26,7 @@ export type {
   LightSource,
   LinearImage,
 } from './lights/light-source.js';
+export type { PhotographSource, TransferredPhoto } from './photo/types.js';
 export type { ErrorCode } from './shared/error-codes.js';
 export { PhotoError } from './shared/errors.js';
 export type { Backend, Gamut, LightName, ToneCurve } from './shared/keywords.js';

@@ -16,6 +16,7 @@ export const DOCUMENT_GROUPS = [
       ['docs/wordpress.md', 'WordPress'],
       ['docs/iiif.md', 'IIIF'],
       ['docs/kiosk.md', 'Kiosk'],
+      ['docs/recover.md', 'Recovery in a page'],
     ],
   },
   {

@@ -1,5 +1,6 @@
 /**
- * Writes dist/THIRD-PARTY.md, the crates in the WebAssembly modules with their licences: node www/tools/third-party.js
+ * Writes dist/THIRD-PARTY.md, the crates in the WebAssembly modules and the packages in the scripts, with their licences:
+ * node www/tools/third-party.js
  * It needs the crates' sources, which cargo has downloaded once the modules are built.
  */
 
@@ -20,11 +21,12 @@ function cargo(...args) {
 
 /** The crates whose code is in the modules, without build tools and procedural macros. */
 function compiledIn() {
-  const tree = cargo('tree', '--target', TARGET, '-e', 'normal,no-proc-macro', '--prefix', 'none');
+  const edges = ['-e', 'normal,no-proc-macro', '--prefix', 'none'];
+  const tree = cargo('tree', '--features', 'recovery', '--target', TARGET, ...edges);
   const names = new Set(tree.split('\n').map((line) => line.split(' ').slice(0, 2).join(' ')));
   /** @type {{ packages: Crate[] }} */
   const { packages } = JSON.parse(
-    cargo('metadata', '--format-version', '1', '--filter-platform', TARGET),
+    cargo('metadata', '--features', 'recovery', '--format-version', '1', '--filter-platform', TARGET),
   );
   return packages
     .filter(({ name, version, source }) => source !== null && names.has(`${name} v${version}`))
@@ -54,6 +56,18 @@ function licencesOf({ name, license, manifest_path }) {
   return { name, texts };
 }
 
+/** The npm packages whose code is in the scripts. */
+const PACKAGES = ['@zip.js/zip.js'];
+
+/** @param {string} name @returns {[title: string, text: string]} */
+function licenceOfPackage(name) {
+  const folder = join(repository, 'node_modules', name);
+  /** @type {{ version: string, license: string }} */
+  const { version, license } = JSON.parse(readFileSync(join(folder, 'package.json'), 'utf8'));
+  const text = readFileSync(join(folder, 'LICENSE'), 'utf8').trim();
+  return [`${name} ${version} (${license})`, text];
+}
+
 /** @param {Crate} crate */
 const titleOf = ({ name, version, license }) => `${name} ${version} (${license ?? 'see below'})`;
 
@@ -67,6 +81,9 @@ for (const crate of crates) {
   if (texts.length === 0) without.push(titleOf(crate));
   for (const text of texts) byText.set(text, [...(byText.get(text) ?? []), titleOf(crate)]);
 }
+for (const [title, text] of PACKAGES.map(licenceOfPackage)) {
+  byText.set(text, [...(byText.get(text) ?? []), title]);
+}
 const sections = [...byText].map(
   ([text, titles]) =>
     `${titles.map((title) => `- ${title}`).join('\n')}\n\n\`\`\`text\n${text}\n\`\`\`\n`,
@@ -78,7 +95,7 @@ const rest =
 writeFileSync(
   join(repository, 'dist/THIRD-PARTY.md'),
   [
-    '# Third-party code in the WebAssembly modules\n\n',
+    '# Third-party code in the WebAssembly modules and scripts\n\n',
     "Besides Rust's standard library (MIT OR Apache-2.0, https://www.rust-lang.org/policies/licenses):\n\n",
     sections.join('\n'),
     ...(rest.length > 0 ? ['\n', ...rest] : []),

@@ -9,6 +9,7 @@ import { reducedMotion } from '../input/reduced-motion.js';
 import type { TransitionOptions } from '../input/transitions.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
+import type { PhotographSource } from '../photo/types.js';
 import { BROWSER_PORTS } from '../player/browser-ports.js';
 import { PhotoSession } from '../player/photo-session.js';
 import type { SessionSettings } from '../player/types.js';
@@ -43,6 +44,8 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   readonly status: LoadStatus<Host>;
   readonly state: ViewerState;
   readonly session: PhotoSession;
+  /** Takes the place of `src`. */
+  photograph: PhotographSource | null = null;
   /** `null` until its script arrives, which is requested with the photograph. */
   #interaction: InteractionController | null = null;
   #inputFetch: Promise<void> | null = null;
@@ -128,16 +131,21 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
 
   attributeChanged(name: string): void {
     // As on <img>, setting the same address again reloads the file.
-    if (name === 'src') this.load();
+    if (name === 'src') this.setPhotograph(null);
     if (/^light(?!-color)/.test(name)) this.#interaction?.stopTorch();
     this.state.clearOverride(name);
     this.schedule();
   }
 
+  setPhotograph(source: PhotographSource | null): void {
+    this.photograph = source;
+    this.load();
+  }
+
   /** Loads the photograph again. An invalid address keeps the last photograph. */
   load(): void {
     this.#reader.readAddress('src');
-    if (this.#reader.errorOf('src') === null || this.session.settings === null) {
+    if (!this.#addressError || !this.session.settings) {
       this.#mustReload = true;
       this.status.set(null);
     }
@@ -388,9 +396,9 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
 
   /** Gives the session new settings, as soon as the photograph may be fetched. */
   #updateSession(options: ElementOptions): void {
-    const { src } = options;
+    const src = this.photograph ?? options.src;
     const last = this.session.settings;
-    const addressError = this.#reader.errorOf('src');
+    const addressError = this.#addressError;
     if (src === null && addressError) {
       if (this.#mustReload) this.#fail(addressError);
       this.#mustReload = false;
@@ -417,6 +425,11 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
       light: this.state.light.setting,
     });
     if (settings !== last || reload) this.session.set(settings, reload);
+  }
+
+  /** Why `src` is invalid, if it is needed. */
+  get #addressError(): PhotoError | null {
+    return this.photograph ? null : this.#reader.errorOf('src');
   }
 
   #reportLight(light: ActiveLight | null): void {

@@ -3,6 +3,7 @@
 import { moduleFolder, setModuleFolder, toModuleFolder } from '../engine/wasm-loader.js';
 import { addTranslation, type Translation } from '../i18n/translations.js';
 import type { TransitionOptions } from '../input/transitions.js';
+import type { PhotographSource } from '../photo/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { Backend, Gamut, LightName } from '../shared/keywords.js';
 import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
@@ -111,9 +112,13 @@ export class RelightablePhotoElement extends Base {
 
   readonly #status = this.#controller.status;
 
-  /** Whether nothing is left to load: the whole photograph is drawn, loading has failed, or there is no `src`. */
+  /** Whether nothing is left to load: the whole photograph is drawn, loading has failed, or there is no photograph. */
   get complete(): boolean {
-    return !this.src || this.#status.phase === 'ready' || this.#status.phase === 'error';
+    return (
+      !(this.photograph || this.src) ||
+      this.#status.phase === 'ready' ||
+      this.#status.phase === 'error'
+    );
   }
 
   /** Why there is no picture; `null` unless the last `load` failed. */
@@ -127,6 +132,17 @@ export class RelightablePhotoElement extends Base {
    */
   get ready(): Promise<this> {
     return this.#status.ready as Promise<this>;
+  }
+
+  /**
+   * A photograph that is not a file, such as `recover()` gives, in place of that of `src`. Setting `src`, or `null`, returns
+   * to `src`.
+   */
+  get photograph(): PhotographSource | null {
+    return this.#controller.photograph;
+  }
+  set photograph(source: PhotographSource | null) {
+    this.#controller.setPhotograph(source ?? null);
   }
 
   /** Loads the photograph again, for example after an error. */
@@ -304,7 +320,7 @@ export class RelightablePhotoElement extends Base {
   connectedCallback(): void {
     this.#controller.schedule();
     // Properties that were set before the element was defined hide the accessors of this class.
-    for (const name of [...PROPERTIES, 'light', 'torch', 'view'] as const) {
+    for (const name of [...PROPERTIES, 'light', 'torch', 'view', 'photograph'] as const) {
       if (Object.hasOwn(this, name)) {
         const value = this[name];
         delete (this as Record<string, unknown>)[name];

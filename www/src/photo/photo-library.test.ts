@@ -2,7 +2,12 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { LoadOptions } from './load-options.js';
 import { LoadQueue, OUT_OF_VIEW } from './load-queue.js';
-import { PhotoLibrary, type PhotoUser, type SharedPhoto } from './photo-library.js';
+import {
+  type PhotoAddress,
+  PhotoLibrary,
+  type PhotoUser,
+  type SharedPhoto,
+} from './photo-library.js';
 import type { LoadedPhotograph } from './photograph.js';
 
 /** The next load starts in a later task. */
@@ -10,6 +15,8 @@ const settle = () => new Promise((resolve) => setTimeout(resolve, 5));
 
 /** The size of each fake photograph; the library holds two. */
 const PHOTO_BYTES = 100;
+
+const nameOf = (src: PhotoAddress['src']) => (typeof src === 'string' ? src : 'source');
 
 function fakeLibrary() {
   const log: string[] = [];
@@ -23,8 +30,9 @@ function fakeLibrary() {
     return { info, isLost: false, free } as unknown as LoadedPhotograph & { isLost: boolean };
   };
   const library = new PhotoLibrary(
-    ({ src }, options) =>
+    (address, options) =>
       new Promise((resolve, reject) => {
+        const src = nameOf(address.src);
         let isLoading = true;
         log.push(`load ${src}`);
         options.signal.addEventListener('abort', () => {
@@ -40,9 +48,13 @@ function fakeLibrary() {
     new LoadQueue(),
     2 * PHOTO_BYTES,
   );
-  const address = (src: string) => ({ src, credentials: 'same-origin' }) as const;
+  const address = (src: PhotoAddress['src']) => ({ src, credentials: 'same-origin' }) as const;
   /** An element. It rests when it is asked. */
-  const open = (src: string, placement = 0, { isResting = false, isReload = false } = {}) => {
+  const open = (
+    src: PhotoAddress['src'],
+    placement = 0,
+    { isResting = false, isReload = false } = {},
+  ) => {
     const abort = new AbortController();
     const events: unknown[] = [];
     let photo: SharedPhoto | null = null;
@@ -62,7 +74,7 @@ function fakeLibrary() {
         events.push(shared);
       },
       rest: () => {
-        log.push(`rest ${src}`);
+        log.push(`rest ${nameOf(src)}`);
         leave();
       },
     };
@@ -118,6 +130,20 @@ test('credentials distinguish addresses', async () => {
   void f.library.open({ src: 'a', credentials: 'include' }, user, signal);
   await f.finish('a');
   assert.deepEqual(await f.takeLog(), ['load a', 'load a']);
+});
+
+test('elements with the same source share one photograph; another source is another one', async () => {
+  const f = fakeLibrary();
+  const source = { load: () => Promise.reject(new Error('the test loads')) };
+  const [one, other, third] = [f.open(source), f.open(source), f.open({ ...source })];
+  await f.finish('source');
+  assert.equal(await one.opened, await other.opened);
+  await f.finish('source');
+  assert.notEqual(await third.opened, await one.opened);
+  one.leave();
+  other.leave();
+  third.leave();
+  assert.deepEqual(await f.takeLog(), ['load source', 'load source', 'free source', 'free source']);
 });
 
 test('a load ends with its last element, in the queue or in progress', async () => {

@@ -1,5 +1,5 @@
 /**
- * The photographs of a page: one for each address, which all elements with that address share. They are loaded in the
+ * The photographs of a page: one for each address or source, which all elements with it share. They are loaded in the
  * order of a `LoadQueue`. Beyond a limit of decoded bytes, photographs that are out of view are released, the farthest
  * first; their elements keep a resting picture, and open them again when they come near.
  */
@@ -9,12 +9,13 @@ import type { LoadOptions } from './load-options.js';
 import { LoadQueue, OUT_OF_VIEW, type Placement, type QueuedLoad } from './load-queue.js';
 import type { LoadedPhotograph } from './photograph.js';
 import { RefCounted } from './ref-counted.js';
+import type { PhotographSource } from './types.js';
 
 export type SharedPhoto = RefCounted<LoadedPhotograph>;
 
 export interface PhotoAddress {
-  /** Absolute. */
-  readonly src: string;
+  /** An absolute address, or what stands for a file. */
+  readonly src: string | PhotographSource;
   readonly credentials: RequestCredentials;
 }
 
@@ -47,10 +48,10 @@ function defaultMaxDecodedBytes(): number {
 
 export class PhotoLibrary {
   /** The entry that an address has now. */
-  readonly #entries = new Map<string, LibraryEntry>();
+  readonly #entries = new Map<unknown, LibraryEntry>();
   readonly #loaded = new Set<LibraryEntry>();
-  /** Decoded bytes of photographs that were loaded before. */
-  readonly #sizes = new Map<string, number>();
+  /** Decoded bytes of files that were loaded before. */
+  readonly #sizes = new Map<unknown, number>();
 
   constructor(
     private readonly load: LoadPhoto,
@@ -68,7 +69,8 @@ export class PhotoLibrary {
     signal: AbortSignal,
     isReload = false,
   ): Promise<SharedPhoto> {
-    const key = `${address.credentials} ${address.src}`;
+    const { src, credentials } = address;
+    const key = typeof src === 'string' ? `${credentials} ${src}` : src;
     let entry = this.#entries.get(key);
     if (!entry || entry.photo?.value.isLost || (isReload && entry.photo)) {
       entry = this.#addEntry(key, address);
@@ -82,14 +84,14 @@ export class PhotoLibrary {
     this.queue.schedule();
   }
 
-  #addEntry(key: string, address: PhotoAddress): LibraryEntry {
+  #addEntry(key: unknown, address: PhotoAddress): LibraryEntry {
     const entry: LibraryEntry = new LibraryEntry((options) => this.load(address, options), {
       mayStart: () => {
         const hasRoom = this.#makeRoom(this.#sizes.get(key) ?? 0, entry.placement);
         return hasRoom || entry.placement < OUT_OF_VIEW || !entry.isResting;
       },
       loaded: (bytes) => {
-        this.#sizes.set(key, bytes);
+        if (typeof key === 'string') this.#sizes.set(key, bytes);
         this.#loaded.add(entry);
         this.update();
       },

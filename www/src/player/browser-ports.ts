@@ -4,13 +4,18 @@ import { forbiddenByPolicy } from '../loading/http-errors.js';
 import { openPhoto } from '../loading/load.js';
 import { createDecoder } from '../photo/create-decoder.js';
 import { PhotoLibrary } from '../photo/photo-library.js';
+import { LoadedPhotograph } from '../photo/photograph.js';
 import { createRenderer, prepare } from '../renderers/renderer-factory.js';
 import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { callLater } from '../shared/promises.js';
 import type { SessionPorts } from './types.js';
 
-const library = new PhotoLibrary(({ src, credentials }, options) =>
-  openPhoto(src, options, {
+const library = new PhotoLibrary(async ({ src, credentials }, options) => {
+  if (typeof src !== 'string') {
+    const { descriptor, tiles } = await src.load(options);
+    return new LoadedPhotograph(descriptor, tiles);
+  }
+  return openPhoto(src, options, {
     createDecoder,
     fetch: (input, init) =>
       withPolicyErrors(
@@ -20,8 +25,8 @@ const library = new PhotoLibrary(({ src, credentials }, options) =>
       ),
     yieldToPage,
     now: () => performance.now(),
-  }),
-);
+  });
+});
 
 export const BROWSER_PORTS: SessionPorts = {
   library,

@@ -67,8 +67,9 @@ export function fakeSession() {
   const session = new PhotoSession(
     {
       library: {
-        open: ({ src }, user, signal) =>
+        open: (address, user, signal) =>
           new Promise((resolve, reject) => {
+            const src = String(address.src);
             users.add(user);
             const onAbort = () => log.push(`abort ${src}`);
             signal.addEventListener('abort', onAbort);

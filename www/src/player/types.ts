@@ -7,14 +7,15 @@ import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadOptions } from '../photo/load-options.js';
 import type { Placement } from '../photo/load-queue.js';
 import type { PhotoLibrary } from '../photo/photo-library.js';
+import type { PhotographSource } from '../photo/types.js';
 import type { BackendPreferences, CreateRenderer, Renderer } from '../renderers/types.js';
 import type { PhotoError } from '../shared/errors.js';
 import type { callLater } from '../shared/promises.js';
 
 /** Everything that the element's attributes and the visitor decide. */
 export interface SessionSettings {
-  /** Absolute address; `null` if there is none. */
-  readonly src: string | null;
+  /** Absolute address, or what stands for a file; `null` if there is neither. */
+  readonly src: string | PhotographSource | null;
   readonly credentials: RequestCredentials;
   readonly backendOptions: BackendPreferences;
   readonly light: LightSetting;
