@@ -5,8 +5,19 @@
 
 import type * as Cpu from '../../dist/wasm/cpu.js';
 import type * as Decoders from '../../dist/wasm/decoder.js';
+import type * as Recoveries from '../../dist/wasm/recovery.js';
 import type * as WebGl2 from '../../dist/wasm/webgl2.js';
 import type * as WebGpu from '../../dist/wasm/webgpu.js';
+import type {
+  LinearPng,
+  MeasurementBuilder,
+  MeasurementInput,
+  PageFiles,
+  RecoveredTransport,
+  Recovery,
+  RecoveryModule,
+  TileRecovery,
+} from '../../www/src/engine/recovery-exports.js';
 import type {
   CanvasRelighter,
   DecodedPhoto,
@@ -174,6 +185,38 @@ type _WebGpuOpen = Extends<
 >;
 type _WebGl2Open = Extends<[HTMLCanvasElement], Parameters<typeof WebGl2.GraphicsDevice.webgl2>>;
 
+type _Input = Extends<Recoveries.MeasurementInput, MeasurementInput>;
+type _ReadFolder = Extends<
+  Parameters<RecoveryModule['MeasurementInput']['readFolder']>,
+  Parameters<typeof Recoveries.MeasurementInput.readFolder>
+>;
+type _Builder = Extends<Recoveries.MeasurementBuilder, MeasurementBuilder>;
+type _BuilderOf = Extends<
+  ConstructorParameters<RecoveryModule['MeasurementBuilder']>,
+  ConstructorParameters<typeof Recoveries.MeasurementBuilder>
+>;
+type _Recovery = Extends<Recoveries.Recovery, Recovery>;
+type _Prepare = Extends<
+  [
+    Recoveries.MeasurementInput,
+    string,
+    string | undefined,
+    number | undefined,
+    (jobs: number) => void,
+  ],
+  Parameters<typeof Recoveries.Recovery.prepare>
+>;
+type _TileRecovery = Extends<Recoveries.TileRecovery, TileRecovery>;
+type _TileRecoveryOf = Extends<[Uint8Array], ConstructorParameters<typeof Recoveries.TileRecovery>>;
+type _Recovered = Extends<Recoveries.RecoveredTransport, RecoveredTransport>;
+type _LinearPng = Extends<Recoveries.LinearPng, LinearPng>;
+type _ReadPhotograph = Extends<
+  [PageFiles, string, number, number],
+  Parameters<typeof Recoveries.readPhotograph>
+>;
+type _ReadPattern = Extends<[PageFiles, string, number], Parameters<typeof Recoveries.readPattern>>;
+type _Emission = Extends<ReturnType<typeof Recoveries.emissionOfCodes>, Float32Array>;
+
 export type Contract = [
   _Decoder,
   _Constructor,
@@ -228,4 +271,17 @@ export type Contract = [
   _WebGpuDrawn,
   _WebGpuOpen,
   _WebGl2Open,
+  _Input,
+  _ReadFolder,
+  _Builder,
+  _BuilderOf,
+  _Recovery,
+  _Prepare,
+  _TileRecovery,
+  _TileRecoveryOf,
+  _Recovered,
+  _LinearPng,
+  _ReadPhotograph,
+  _ReadPattern,
+  _Emission,
 ];

@@ -14,11 +14,14 @@ import {
   waitForEvents,
   waitForLoad,
 } from './page-helpers.js';
-import { LIGHTS, nativePicture } from './test-photos.js';
+import { prepareRecovery, recoverFixture } from './recovery-page.js';
+import { glassBytes, LIGHTS, nativePicture } from './test-photos.js';
 
 /** @typedef {import('./any-browser.js').AnyPage} AnyPage */
 /** @typedef {import('./page-helpers.js').ElementEvent} ElementEvent */
 
+/** Between codes of a recovered photograph and of its file, which is coarser. */
+const MAX_RECOVERED_DIFFERENCE = 6;
 const PAGE = '/monitored';
 const SRC = '/photos/glass.ltm';
 const ELEMENTS = 16;
@@ -170,6 +173,22 @@ export function testEveryBrowser(test, browser) {
         ).toBeTruthy();
       }
     });
+  });
+
+  test('a capture folder is recovered to the file that the command line writes', async ({
+    openAnyPage,
+  }) => {
+    const page = await openAnyPage(PAGE);
+    await prepareRecovery(page);
+    const { file, seconds, heldOutSnr } = await recoverFixture(page);
+    note(`${seconds.toFixed(2)} s, held out ${heldOutSnr} dB`);
+    expect(file.equals(glassBytes())).toBe(true);
+    await mountPhoto(page, { backend: 'cpu' });
+    await page.evaluate('photo.photograph = recovered');
+    await waitForLoad(page);
+    const { worst } = compare(await capturePicture(page), nativePicture('flood'));
+    expect(worst).toBeLessThanOrEqual(MAX_RECOVERED_DIFFERENCE);
+    await page.evaluate('recovered.free()');
   });
 
   test.describe('an element', () => {

@@ -89,6 +89,12 @@ function sendRange(response, request, file = {}) {
 /** The first half of the photograph. */
 const firstHalf = () => glassBytes().subarray(0, glassBytes().length / 2);
 
+/** Files of tests/fixtures. @type {Handler} */
+const sendFixture = (response, request) => {
+  const bytes = readFileSync(join(import.meta.dirname, '..', request.url ?? ''));
+  response.writeHead(200, { 'Content-Length': bytes.length }).end(bytes);
+};
+
 /** Handlers by path. @type {Record<string, Handler>} */
 const HANDLERS = {
   '/faults/status': (response) => response.writeHead(503, 'Service Unavailable').end('later'),
@@ -212,7 +218,7 @@ export async function startTestServer() {
     const ranges = requestedRanges.get(url) ?? [];
     requestedRanges.set(url, ranges);
     const count = ranges.push(request.headers.range?.replace('bytes=', ''));
-    const handler = HANDLERS[path];
+    const handler = path.startsWith('/fixtures/') ? sendFixture : HANDLERS[path];
     if (handler) handler(response, request, count);
     else serveSite(request, response);
   };

@@ -26,7 +26,15 @@ function compiledIn() {
   const names = new Set(tree.split('\n').map((line) => line.split(' ').slice(0, 2).join(' ')));
   /** @type {{ packages: Crate[] }} */
   const { packages } = JSON.parse(
-    cargo('metadata', '--features', 'recovery', '--format-version', '1', '--filter-platform', TARGET),
+    cargo(
+      'metadata',
+      '--features',
+      'recovery',
+      '--format-version',
+      '1',
+      '--filter-platform',
+      TARGET,
+    ),
   );
   return packages
     .filter(({ name, version, source }) => source !== null && names.has(`${name} v${version}`))
