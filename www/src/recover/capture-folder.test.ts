@@ -45,13 +45,15 @@ function fakeDrop(files: Record<string, Blob | Record<string, Blob>>) {
     return { isFile: false, isDirectory: true, fullPath, createReader: () => ({ readEntries }) };
   };
   const entries = Object.entries(files);
-  const items = entries.map(([name, content]) => ({
+  const text = { kind: 'string', webkitGetAsEntry: () => null };
+  const fileItems = entries.map(([name, content]) => ({
+    kind: 'file',
     webkitGetAsEntry: () => toEntry(`/${name}`, content),
   }));
   const dropped = entries.map(([name, content]) =>
     content instanceof Blob ? new File([content], name) : new File([], name),
   );
-  return { items, files: dropped } as unknown as DataTransfer;
+  return { items: [text, ...fileItems], files: dropped } as unknown as DataTransfer;
 }
 
 /** A zip with compressed entries. */

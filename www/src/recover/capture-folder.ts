@@ -41,7 +41,8 @@ async function readFiles(source: Parameters<typeof openCaptureFolder>[0]): Promi
 
 /** The items are valid only until the listener ends. */
 async function readDrop({ items, files: dropped }: DataTransfer): Promise<Files> {
-  const entries = [...items].map((item) => item.webkitGetAsEntry?.() ?? null);
+  const fileItems = [...items].filter(({ kind }) => kind === 'file');
+  const entries = fileItems.map((item) => item.webkitGetAsEntry?.() ?? null);
   const all = [...dropped];
   const files: Files = new Map();
   try {

@@ -37,7 +37,10 @@ export class RecoveryClient {
     args: Parameters<RecoveryCalls[M]>,
     { transfer, onProgress }: CallOptions = {},
   ): Promise<ReturnType<RecoveryCalls[M]>> {
-    const result = await this.#client.request({ method, args }, transfer, onProgress);
+    const request = this.#client.request({ method, args }, transfer, onProgress);
+    const result = await request.catch((thrown: unknown) => {
+      throw thrown instanceof DOMException ? unsendable(thrown) : thrown;
+    });
     if ('value' in result) return result.value as ReturnType<RecoveryCalls[M]>;
     // The state of a module that has stopped is undefined.
     if (result.stopped) this.terminate();
@@ -48,4 +51,9 @@ export class RecoveryClient {
   terminate(): void {
     this.#client.terminate();
   }
+}
+
+function unsendable(cause: DOMException): PhotoError {
+  const message = `A picture cannot be sent to the worker: ${cause.message}`;
+  return new PhotoError('recover-options', message, cause);
 }

@@ -1,6 +1,6 @@
 /** The pictures of a page in the form in which workers get them. */
 
-import { PhotoError } from '../shared/errors.js';
+import { messageOf, PhotoError } from '../shared/errors.js';
 import type { PictureSize, SentPicture } from './protocol.js';
 import type { PhotographInput } from './types.js';
 
@@ -11,7 +11,12 @@ const PNG_SIGNATURE = 0x89504e47;
 /** Nothing of it is copied yet. Rejects with `recover-options` if it is no picture. */
 export async function toSentPicture(input: PhotographInput, name: string): Promise<SentPicture> {
   if (isBytes(input)) return new Blob([input as Uint8Array<ArrayBuffer>]);
-  if (isCanvas(input)) return createImageBitmap(input);
+  if (isCanvas(input)) {
+    return createImageBitmap(input).catch((cause: unknown) => {
+      const message = `${name} cannot be read: ${messageOf(cause)}.`;
+      throw new PhotoError('recover-options', message, cause);
+    });
+  }
   if (input instanceof Blob) return input;
   if (typeof input === 'object' && input !== null && 'width' in input) {
     if (!('data' in input) || !(input.data instanceof Float32Array)) return input as ImageData;
