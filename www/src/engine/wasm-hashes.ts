@@ -7,5 +7,6 @@ export const decoder = '';
 export const decoder_scalar = '';
 export const cpu = '';
 export const cpu_scalar = '';
+export const recovery = '';
 export const webgl2 = '';
 export const webgpu = '';
