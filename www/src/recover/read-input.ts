@@ -30,9 +30,15 @@ async function sizeOfFolder({ folder, shots }: FolderInput): Promise<RecoverySiz
       shots: listed,
     } = JSON.parse((await folder.get('capture.json')?.text()) ?? '');
     const held = Math.floor(listed.length / HOLD_OUT_INTERVAL);
-    const sizes = [camera.width, camera.height, light.width, light.height];
-    const [width = 0, height = 0, lightWidth = 0, lightHeight = 0] = sizes.map(Number);
-    return { width, height, lightWidth, lightHeight, photographs: shots ?? listed.length - held };
+    const { width, height } = camera;
+    const size = {
+      width,
+      height,
+      lightWidth: light.width,
+      lightHeight: light.height,
+      photographs: shots ?? listed.length - held,
+    };
+    return Object.values(size).every(Number.isFinite) ? size : undefined;
   } catch {
     return undefined;
   }

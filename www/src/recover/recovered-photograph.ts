@@ -140,5 +140,5 @@ export class CoordinatedPhotograph implements RecoveredPhotograph {
 }
 
 function toDecibels({ signal, error }: PictureError): number | undefined {
-  return signal > 0 && error > 0 ? 10 * Math.log10(signal / error) : undefined;
+  return signal > 0 ? 10 * Math.log10(signal / error) : undefined;
 }

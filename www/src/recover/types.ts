@@ -176,7 +176,10 @@ export interface RecoveredPhotograph extends PhotographSource {
    * The `.ltm` file. Once `signal` is aborted, this rejects; the worker encodes to the end before it does anything else.
    */
   toBlob(quality?: FileQuality, options?: ProgressOptions): Promise<Blob>;
-  /** SNR in decibels of the pictures under the lights, over all pairs. The dark photograph is subtracted. */
+  /**
+   * SNR in decibels of the pictures under the lights, over all pairs: infinite if they are the photographs, `undefined`
+   * if those are black. The dark photograph is subtracted.
+   */
   evaluate(pairs: readonly EvaluationPair[]): Promise<number | undefined>;
   /** SNR in decibels on the shots of the folder that were held out; `undefined` without any. */
   evaluateHeldOut(): Promise<number | undefined>;
