@@ -10,8 +10,10 @@ import { openVirtualDisplay } from './virtual-display.js';
 /** @typedef {(method: 'GET' | 'POST' | 'DELETE', path: string, body?: object) => Promise<any>} Command */
 
 const START_MS = 20_000;
-/** Time-out of scripts and of `waitForFunction`. */
+/** Time-out of `waitForFunction`. */
 const WAIT_MS = 30_000;
+/** Time-out of scripts, one of which recovers a capture: that of a test. */
+const SCRIPT_MS = 120_000;
 const POLL_INTERVAL_MS = 50;
 /** The protocol's name for a reference to an element. */
 const ELEMENT = 'element-6066-11e4-a52e-4f735466cecf';
@@ -52,7 +54,7 @@ export async function launchWebKitGtk(driver) {
     const isReady = async () => (await request('GET', '/status').catch(() => null))?.ready;
     await waitUntil(isReady, START_MS, 'WebKitWebDriver does not answer');
     const { sessionId } = await request('POST', '/session', {
-      capabilities: { alwaysMatch: { timeouts: { script: WAIT_MS } } },
+      capabilities: { alwaysMatch: { timeouts: { script: SCRIPT_MS } } },
     });
     /** @type {Command} */
     const command = (method, path, body) => request(method, `/session/${sessionId}${path}`, body);
