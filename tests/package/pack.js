@@ -55,8 +55,9 @@ const ALSO = [
   /^dist\/types\/(?!.*(test|fakes))[a-z0-9/-]+\.d\.ts$/,
 ];
 
-const MAX_UNPACKED_BYTES = 3_500_000;
-const MAX_PACKED_BYTES = 1_200_000;
+/** Of these, 1.8 MB and 0.7 MB are for recovery: its module, its scripts, and the reader of zip files. */
+const MAX_UNPACKED_BYTES = 5_300_000;
+const MAX_PACKED_BYTES = 1_900_000;
 const MAX_MAP_BYTES = 500_000;
 
 const { folder, place } = unpacked('imported');
