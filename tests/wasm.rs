@@ -8,6 +8,8 @@
 
 mod common;
 
+use std::sync::OnceLock;
+
 use common::relit::{self, TileContents};
 use common::tiled;
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
@@ -131,16 +133,20 @@ fn decode(bytes: &[u8], piece: usize) -> Result<Photo, CodedError> {
     decoder.finish()
 }
 
-fn photo(transport: &Transport) -> Photo {
-    decode(&file(transport, &Metadata::default()), 1 << 16).unwrap()
+/// The file of one of the transports. Encoding takes much longer than drawing, so all tests share the files.
+fn transport_file(i: usize) -> &'static [u8] {
+    static FILES: [OnceLock<Vec<u8>>; 6] = [const { OnceLock::new() }; 6];
+    FILES[i].get_or_init(|| file(&transport(i), &Metadata::default()))
 }
 
-/// The transport after encoding and decoding, which rounds it to half precision.
-fn round_trip(transport: &Transport) -> Transport {
+fn photo(i: usize) -> Photo {
+    decode(transport_file(i), 1 << 16).unwrap()
+}
+
+/// The transport of [`photo`]: that of [`transport`], rounded to half precision.
+fn decoded_transport(i: usize) -> Transport {
     let mut reader = LtmReader::new(Limits::default());
-    reader
-        .feed(0, &file(transport, &Metadata::default()))
-        .unwrap();
+    reader.feed(0, transport_file(i)).unwrap();
     reader.finish().unwrap().0
 }
 
@@ -270,8 +276,7 @@ fn coded<T>(result: Result<T, CodedError>) -> String {
 
 async fn assert_backend_draws_the_reference(backend: &str) {
     for (i, geometry) in geometries().into_iter().enumerate() {
-        let transport = round_trip(&transport(i));
-        let photo = photo(&transport);
+        let (transport, photo) = (decoded_transport(i), photo(i));
         let canvas = new_canvas();
         let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
         for (j, (name, light)) in relit::lights(geometry.light).into_iter().enumerate() {
@@ -314,11 +319,11 @@ async fn webgpu_draws_the_reference() {
 
 #[wasm_bindgen_test]
 async fn lower_quality_is_the_first_components_whatever_came_before() {
-    let transport = round_trip(&transport(0));
+    let transport = decoded_transport(0);
     let quads = transport.basis.rank().div_ceil(4);
     assert!(quads > 1);
     for backend in BACKENDS {
-        let photo = photo(&transport);
+        let photo = photo(0);
         let canvas = new_canvas();
         let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
         for name in ["flood", "spectrum"] {
@@ -342,8 +347,7 @@ async fn lower_quality_is_the_first_components_whatever_came_before() {
 
 #[wasm_bindgen_test]
 async fn built_in_lights_are_drawn_by_name() {
-    let transport = transport(0);
-    let photo = photo(&transport);
+    let (transport, photo) = (transport(0), photo(0));
     let canvas = new_canvas();
     let mut relighter = open_relighter("cpu", &photo, &canvas).await.unwrap();
     for (name, light) in relit::lights(transport.geometry.light) {
@@ -366,11 +370,8 @@ async fn the_torch_is_behind_its_point_of_the_picture() {
     // Rotated by 90°: picture (x, y) lies in front of light (y, 1 - x).
     let affine = [[0.0, 0.5, 0.0], [-0.5, 0.0, 16.0]];
     let geometry = tiled([32, 32], [16, 16], 3, 8, affine);
-    let photo = photo(&relit::asymmetric_transport(
-        geometry,
-        TileContents::Factored,
-        4,
-    ));
+    let transport = relit::asymmetric_transport(geometry, TileContents::Factored, 4);
+    let photo = decode(&file(&transport, &Metadata::default()), 1 << 16).unwrap();
     let canvas = new_canvas();
     let mut relighter = open_relighter("cpu", &photo, &canvas).await.unwrap();
     for (x, y) in [(0.25, 0.75), (0.5, 0.5), (0.8, 0.2)] {
@@ -430,8 +431,7 @@ fn a_file_decodes_in_pieces_of_any_size() {
 
 #[wasm_bindgen_test]
 async fn a_photo_is_transferred_to_another_module_tile_by_tile() {
-    let transport = round_trip(&transport(0));
-    let mut sent = photo(&transport);
+    let (transport, mut sent) = (decoded_transport(0), photo(0));
     let (geometry, basis) = (sent.pack_geometry(), sent.pack_basis());
     let mut received = Photo::receive(&geometry, &basis).unwrap();
     assert_eq!(
@@ -517,9 +517,9 @@ fn a_decoder_asks_for_each_byte_once() {
 
 #[wasm_bindgen_test]
 fn each_kind_of_invalid_file_has_its_code() {
-    let good = file(&transport(0), &Metadata::default());
+    let good = transport_file(0);
     let damaged = |at: usize, to: u8| {
-        let mut bytes = good.clone();
+        let mut bytes = good.to_vec();
         bytes[at] = to;
         coded(decode(&bytes, 4096))
     };
@@ -540,10 +540,10 @@ fn each_kind_of_invalid_file_has_its_code() {
     );
     assert_eq!(coded(decode(&[], 1)), "format-truncated");
     assert_eq!(
-        coded(decode(&[&good[..], b"more"].concat(), 4096)),
+        coded(decode(&[good, b"more"].concat(), 4096)),
         "format-invalid"
     );
-    let limited = Decoder::new(Some(1e5)).feed(0.0, &good);
+    let limited = Decoder::new(Some(1e5)).feed(0.0, good);
     assert_eq!(coded(limited), "format-limit");
     let gap = Decoder::new(None).feed(1000.0, &good[1000..]);
     assert_eq!(coded(gap), "format-invalid");
@@ -551,7 +551,7 @@ fn each_kind_of_invalid_file_has_its_code() {
 
 #[wasm_bindgen_test]
 async fn invalid_lights_and_exposures_are_refused() {
-    let [one, other] = [0, 1].map(|i| photo(&transport(i)));
+    let [one, other] = [0, 1].map(photo);
     let linear = |values: &[f32], width, height| {
         WebLight::from_linear(&one, &Float32Array::from(values), width, height)
     };
@@ -576,7 +576,7 @@ async fn invalid_lights_and_exposures_are_refused() {
 
 #[wasm_bindgen_test]
 async fn a_canvas_in_use_is_refused() {
-    let photo = photo(&transport(0));
+    let photo = photo(0);
     for (backend, used_for) in [("webgpu", "2d"), ("webgl2", "webgl2"), ("cpu", "webgl2")] {
         let canvas = new_canvas();
         let taken: Option<Object> = canvas.get_context(used_for).unwrap();
@@ -592,10 +592,10 @@ async fn a_canvas_in_use_is_refused() {
 #[wasm_bindgen_test]
 async fn a_photo_can_be_freed_and_replaced() {
     for backend in BACKENDS {
-        for transport in [0, 2].map(transport) {
+        for i in [0, 2] {
             // Each relighter needs a new canvas.
             let canvas = new_canvas();
-            let photo = photo(&transport);
+            let (transport, photo) = (transport(i), photo(i));
             let light = WebLight::builtin(&photo, "spectrum").unwrap();
             let mut relighter = open_relighter(backend, &photo, &canvas).await.unwrap();
             drop(photo);
@@ -609,7 +609,7 @@ async fn a_photo_can_be_freed_and_replaced() {
 
 #[wasm_bindgen_test]
 async fn a_lost_webgl2_context_is_reported() {
-    let photo = photo(&transport(0));
+    let photo = photo(0);
     let light = WebLight::builtin(&photo, "flood").unwrap();
     let hidden = new_canvas();
     let device = GraphicsDevice::webgl2(hidden.clone()).unwrap();
@@ -637,8 +637,8 @@ async fn photographs_share_one_device() {
         let output = WebOutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
         let mut relighters = Vec::new();
         for i in [0, 1, 2, 0] {
-            let transport = round_trip(&transport(i));
-            let (photo, canvas) = (photo(&transport), new_canvas());
+            let transport = decoded_transport(i);
+            let (photo, canvas) = (photo(i), new_canvas());
             let relighter = relighter_on(&device, &photo, &canvas, "srgb")
                 .await
                 .unwrap();
@@ -662,8 +662,7 @@ async fn photographs_share_one_device() {
 
 #[wasm_bindgen_test]
 async fn all_output_transforms_match_the_reference() {
-    let transport = round_trip(&transport(0));
-    let photo = photo(&transport);
+    let (transport, photo) = (decoded_transport(0), photo(0));
     let (name, light) = relit::lights(transport.geometry.light).swap_remove(4);
     let web_light = WebLight::builtin(&photo, name).unwrap();
     let balance = [1.3, 1.0, 0.6];
