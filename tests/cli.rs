@@ -6,6 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
+use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -91,13 +92,24 @@ fn edit_manifest(capture: &Path, edit: impl FnOnce(&mut Value)) {
     fs::write(path, manifest.to_string()).unwrap();
 }
 
-/// A small, quickly recovered file.
-fn small_ltm(folder: &Path) -> PathBuf {
+/// Recovers a small file.
+fn recover_small_ltm(folder: &Path) -> PathBuf {
     let file = folder.join("small.ltm");
     let args = ["--patterns", "12", "--window", "3"];
     let fixture = fixture();
     let output = run(&[&["recover", text(&fixture), "-o", text(&file)], &args[..]].concat());
     assert!(output.status.success());
+    file
+}
+
+/// A small file, the same for all tests.
+fn small_ltm(folder: &Path) -> PathBuf {
+    static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let folder = TempDir::new().unwrap();
+        fs::read(recover_small_ltm(folder.path())).unwrap()
+    });
+    let file = folder.join("small.ltm");
+    fs::write(&file, &*BYTES).unwrap();
     file
 }
 
@@ -258,7 +270,7 @@ fn each_method_is_selected_by_name_and_recorded_in_the_file() {
 fn recovery_is_reproducible_bit_for_bit() {
     let folder = TempDir::new().unwrap();
     let first = fs::read(small_ltm(folder.path())).unwrap();
-    let second = fs::read(small_ltm(folder.path())).unwrap();
+    let second = fs::read(recover_small_ltm(folder.path())).unwrap();
     assert_eq!(first, second);
 }
 
@@ -420,7 +432,7 @@ fn an_input_given_as_output_is_not_overwritten() {
     assert_eq!(fs::read(&photo).unwrap(), before);
     assert!(error_message(&["verify", text(folder.path())]).contains("is a folder"));
     // A file that the program wrote is replaced.
-    assert_eq!(small_ltm(folder.path()), file);
+    assert_eq!(recover_small_ltm(folder.path()), file);
 }
 
 #[test]

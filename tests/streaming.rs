@@ -30,12 +30,23 @@ fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-fn simulate(folder: &TempDir, scene: &str, size: &[&str]) -> PathBuf {
-    let capture = folder.path().join("capture");
-    let args = ["simulate", scene, "-o", text(&capture)];
+fn simulate(capture: &Path, scene: &str, size: &[&str]) {
+    let args = ["simulate", scene, "-o", text(capture)];
     let output = command(&[&args, size].concat()).output().unwrap();
     assert!(output.status.success(), "{}", stderr_text(&output));
-    capture
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy_folder(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
 }
 
 #[test]
@@ -49,7 +60,8 @@ fn with_little_memory_photographs_are_read_in_strips_with_the_same_result() {
         "--patterns",
         "100",
     ];
-    let capture = simulate(&folder, "stained-glass", &size);
+    let capture = folder.path().join("capture");
+    simulate(&capture, "stained-glass", &size);
     let recover = |method: &str, memory: &str| {
         let file = folder.path().join(format!("{method}-{memory}.ltm"));
         let args = [
@@ -106,6 +118,15 @@ fn with_little_memory_photographs_are_read_in_strips_with_the_same_result() {
     assert_eq!(impossible.status.code(), Some(2));
 }
 
+/// The capture that every [`Interruptible`] has a copy of.
+static CAPTURE: LazyLock<PathBuf> = LazyLock::new(|| {
+    let capture = Path::new(env!("CARGO_TARGET_TMPDIR")).join("streaming-capture");
+    let _ = fs::remove_dir_all(&capture);
+    let size = ["--camera", "128x64", "--light", "64x32", "--patterns", "16"];
+    simulate(&capture, "cookies", &size);
+    capture
+});
+
 /// The file of an uninterrupted recovery, the same for every [`Interruptible`].
 static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let recovery = Interruptible::new();
@@ -123,8 +144,8 @@ struct Interruptible {
 impl Interruptible {
     fn new() -> Self {
         let folder = TempDir::new().unwrap();
-        let size = ["--camera", "128x64", "--light", "64x32", "--patterns", "16"];
-        let capture = simulate(&folder, "cookies", &size);
+        let capture = folder.path().join("capture");
+        copy_folder(&CAPTURE, &capture);
         Self { folder, capture }
     }
 
