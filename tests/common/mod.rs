@@ -84,7 +84,7 @@ pub fn with_directory(file: &[u8], edit: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let [directory, rest] = directory_bounds(file);
     let mut content = zstd::bulk::decompress(&file[directory..rest], 1 << 20).unwrap();
     edit(&mut content);
-    let packed = zstd::bulk::compress(&content, 19).unwrap();
+    let packed = zstd::bulk::compress(&content, 1).unwrap();
     let mut edited = [&file[..directory], &packed, &file[rest..]].concat();
     let length = packed.len() as u32;
     edited[104..108].copy_from_slice(&length.to_le_bytes());
@@ -140,7 +140,7 @@ fn seal_chunks(file: &mut Vec<u8>) {
             }
         }
     }
-    let Ok(packed) = zstd::bulk::compress(&content, 19) else {
+    let Ok(packed) = zstd::bulk::compress(&content, 1) else {
         return;
     };
     let grown = packed.len() as i64 - (end - start) as i64;
