@@ -31,7 +31,7 @@ pub mod job_executor;
 mod linalg;
 pub mod recover;
 pub mod relight;
-#[cfg(all(feature = "simulate", not(target_arch = "wasm32")))]
+#[cfg(feature = "simulate")]
 pub mod simulate;
 #[cfg(all(feature = "study", not(target_arch = "wasm32")))]
 pub mod study;

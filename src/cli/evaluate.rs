@@ -16,8 +16,8 @@ use super::report::{format_bytes, print_json, print_line};
 use crate::capture::{CameraRowSet, CaptureFolder, GroundTruth, LinearPhoto, PhotographRowReader};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light};
-use crate::study::{CaptureTruth, psnr, transport_error};
-use crate::transport::{CHANNELS, Decibels, SnrAccumulator};
+use crate::study::{CaptureTruth, psnr};
+use crate::transport::{CHANNELS, Decibels, SnrAccumulator, transport_error};
 
 /// Compare a file with the known transport, the relit pictures and the unused photographs of a capture
 #[derive(Debug, Args)]

@@ -11,12 +11,9 @@ use super::output_folder;
 use super::process_resources::AllCoresExecutor;
 use crate::capture::{CameraRowSet, CaptureFolder, Measurements};
 use crate::relight::Light;
-use crate::simulate::{SceneKind, SimulatedScene, WINDOW_SIDE};
-use crate::study::{
-    self, CaptureTruth, EvaluationLight, KnownTransport, ProgressLog, ReportSection, SNR_PATTERNS,
-    SimulatedCapture,
-};
-use crate::transport::Extent;
+use crate::simulate::{SceneKind, SimulatedCapture, SimulatedScene, WINDOW_SIDE, first_shots};
+use crate::study::{self, CaptureTruth, EvaluationLight, ProgressLog, ReportSection, SNR_PATTERNS};
+use crate::transport::{Extent, KnownTransport};
 
 const PARTS: [&str; 4] = ["stained-glass", "cookies", "comparison", "scenes"];
 /// The paper's scale for glass: N = 262,144 and M = 65,536.
@@ -202,7 +199,7 @@ impl<'a> StudySubject<'a> {
     ) -> Result<Vec<ReportSection>> {
         let (name, pixels, progress) = (&self.name, self.pixels, self.progress);
         let sparsity = study::sparsity(name, known, CORES, progress)?;
-        let first = study::first_shots(&measurements, RELIT_PATTERNS);
+        let first = first_shots(&measurements, RELIT_PATTERNS);
         let relit = study::relit_pictures(name, known, &first, lights, CORES, progress)?;
         drop(first);
         let curves = study::snr_curves(name, known, measurements, pixels, CORES, progress)?;

@@ -8,12 +8,14 @@
 
 mod cholesky;
 mod eigen;
+mod eigenvalues;
 mod matrix;
 mod vector;
 mod vectorise;
 
 pub(crate) use cholesky::{cholesky, cholesky_inverse, cholesky_solve, cholesky_with_ridge};
 pub(crate) use eigen::symmetric_eigen;
+pub(crate) use eigenvalues::symmetric_eigenvalues;
 pub(crate) use matrix::{mirror_upper, multiply, multiply_vector, transpose};
 pub(crate) use vector::{
     LANES, add_scaled, add_scaled_padded, add_scaled_rows, dot, dot_padded, padded_len,

@@ -5,8 +5,8 @@
 //! of light in it. The lengths that determine the band (scattering widths, refraction, parallax) are in
 //! light elements, so that one window holds the band at every resolution.
 //!
-//! [`EmissionMatrix`] computes y = pT under many lights, [`Camera`] adds noise. This module uses no threads,
-//! files or clock; callers compute [`SimulatedScene::tile`] in parallel.
+//! [`EmissionMatrix`] computes y = pT under many lights, [`Camera`] adds noise; [`SimulatedCapture`] does both in
+//! memory. This module uses no threads, files or clock; callers compute [`SimulatedScene::tile`] in parallel.
 
 mod camera;
 mod cookies;
@@ -15,6 +15,7 @@ mod gradient_noise;
 mod pattern_image;
 mod scene_kind;
 mod signed_distance;
+mod simulated_capture;
 mod simulated_scene;
 mod stained_glass;
 mod truth_lights;
@@ -24,5 +25,6 @@ pub use camera::{Camera, RandomStreamId};
 pub use emission_matrix::EmissionMatrix;
 pub use pattern_image::{GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, emission};
 pub use scene_kind::SceneKind;
+pub use simulated_capture::{SimulatedCapture, emitted_pattern, first_shots};
 pub use simulated_scene::{SimulatedScene, WINDOW_SIDE};
 pub use truth_lights::truth_lights;

@@ -37,7 +37,10 @@ impl PatternImage {
 
 /// A distribution of random patterns. The command line shows the variants' descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(
+    all(feature = "cli", not(target_arch = "wasm32")),
+    derive(clap::ValueEnum)
+)]
 pub enum PatternEnsemble {
     /// Clipped Gaussian around half brightness
     Gaussian,

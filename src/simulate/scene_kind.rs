@@ -8,7 +8,10 @@ use crate::transport::{Extent, GeometryError};
 
 /// The built-in scenes. The command line shows the variants' descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(
+    all(feature = "cli", not(target_arch = "wasm32")),
+    derive(clap::ValueEnum)
+)]
 pub enum SceneKind {
     /// A rose window lit from behind
     StainedGlass,

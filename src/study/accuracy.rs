@@ -4,13 +4,12 @@ use std::time::Instant;
 
 use super::chart::ChartSeries;
 use super::error::StudyError;
-use super::known_transport::{KnownTransport, transport_error};
 use super::method_sample_sizes::sample_for;
 use super::pixel_sampling;
 use crate::capture::Measurements;
 use crate::job_executor::Executor;
 use crate::recover::{Method, PreparedRecovery, RecoverySettings};
-use crate::transport::{Decibels, SnrAccumulator};
+use crate::transport::{Decibels, KnownTransport, SnrAccumulator, transport_error};
 
 /// SNR and time of a method.
 #[derive(Clone, Copy, Debug)]

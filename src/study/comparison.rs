@@ -12,12 +12,11 @@ use super::method_sample_sizes;
 use super::nystrom::{NystromSamples, NystromTransport};
 use super::pixel_sampling;
 use super::section::{MarkdownTable, ProgressLog, ReportSection, seconds_cell, snr_cell};
-use super::simulated_capture::{SimulatedCapture, first_shots};
 use super::unwindowed;
 use crate::capture::LinearPhoto;
 use crate::job_executor::Executor;
 use crate::recover::Method;
-use crate::simulate::{PatternEnsemble, PatternImage};
+use crate::simulate::{PatternEnsemble, PatternImage, SimulatedCapture, first_shots};
 use crate::transport::{CHANNELS, Extent, Geometry, SnrAccumulator};
 
 /// Numbers of photographs at the points of curves, ascending.

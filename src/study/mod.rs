@@ -1,8 +1,8 @@
 //! Evaluation of recovery on known light transport: the figures of the paper (Thanikachalam et al. 2014), its
 //! comparison with other acquisition methods, and a table of scenes.
 //!
-//! Each part takes a [`KnownTransport`] and measurements of it and returns a [`ReportSection`]: text, tables and
-//! pictures in memory. The caller writes them to files.
+//! Each part takes a [`KnownTransport`](crate::transport::KnownTransport) and measurements of it and returns a
+//! [`ReportSection`]: text, tables and pictures in memory. The caller writes them to files.
 
 mod accuracy;
 mod brute_force_scan;
@@ -16,7 +16,6 @@ mod picture_sheet;
 mod pixel_sampling;
 mod relit_pictures;
 mod section;
-mod simulated_capture;
 mod snr_curves;
 mod transport_structure;
 mod unseen_scenes;
@@ -24,10 +23,9 @@ mod unwindowed;
 
 pub use comparison::comparison;
 pub use error::StudyError;
-pub use known_transport::{CaptureTruth, KnownTransport, transport_error};
+pub use known_transport::CaptureTruth;
 pub use relit_pictures::{EvaluationLight, built_in_lights, psnr, relit_pictures};
 pub use section::{ProgressLog, ReportSection};
-pub use simulated_capture::{SimulatedCapture, first_shots};
 pub use snr_curves::{SNR_PATTERNS, snr_curves};
 pub use transport_structure::sparsity;
 pub use unseen_scenes::scenes_table;

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::error::StudyError;
-use super::known_transport::{KnownTransport, known_picture, relight_pixel};
+use super::known_transport::{known_picture, relight_pixel};
 use super::method_sample_sizes::{self, DEFAULT_METHOD};
 use super::picture_sheet::{CaptionedPanel, PanelImage, PictureSheet};
 use super::section::{MarkdownTable, ProgressLog, ReportSection, snr_cell};
@@ -11,7 +11,7 @@ use crate::capture::Measurements;
 use crate::job_executor::Executor;
 use crate::recover::{PreparedRecovery, RecoverySettings};
 use crate::relight::{BuiltinLight, Light, area_resample};
-use crate::transport::{CHANNELS, Decibels, Extent, Tile};
+use crate::transport::{CHANNELS, Decibels, Extent, KnownTransport, Tile};
 
 /// Largest width and height of a picture on the sheet.
 const MAX_PANEL_SIDE_PX: u32 = 200;

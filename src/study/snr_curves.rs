@@ -3,13 +3,12 @@
 use super::accuracy::{MethodCurve, measure_accuracy};
 use super::chart::{LineChart, axis_range};
 use super::error::StudyError;
-use super::known_transport::KnownTransport;
 use super::method_sample_sizes;
 use super::section::{MarkdownTable, ProgressLog, ReportSection, seconds_cell, snr_cell};
 use crate::capture::{Measurements, NoiseModel};
 use crate::job_executor::Executor;
 use crate::recover::Method;
-use crate::transport::Extent;
+use crate::transport::{Extent, KnownTransport};
 
 /// Numbers of patterns L, ascending.
 pub const SNR_PATTERNS: [usize; 11] = [10, 14, 20, 28, 40, 56, 80, 112, 160, 224, 320];

@@ -5,11 +5,10 @@ use std::collections::BTreeMap;
 
 use super::chart::{ChartSeries, LineChart};
 use super::error::StudyError;
-use super::known_transport::KnownTransport;
 use super::picture_sheet::{CaptionedPanel, PanelImage, PictureSheet};
 use super::section::{MarkdownTable, ProgressLog, ReportSection};
 use crate::job_executor::Executor;
-use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry};
+use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry, KnownTransport};
 
 /// Ignored low bits of the mantissa: elements within 1/64 of each other are in one class.
 const IGNORED_BITS: u32 = 17;

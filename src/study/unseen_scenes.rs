@@ -4,10 +4,9 @@ use super::accuracy::measure_accuracy;
 use super::error::StudyError;
 use super::method_sample_sizes::{self, DEFAULT_METHOD};
 use super::section::{MarkdownTable, ProgressLog, ReportSection, snr_cell};
-use super::simulated_capture::SimulatedCapture;
 use crate::job_executor::Executor;
 use crate::recover::Method;
-use crate::simulate::{PatternEnsemble, SceneKind};
+use crate::simulate::{PatternEnsemble, SceneKind, SimulatedCapture};
 use crate::transport::Extent;
 
 use PatternEnsemble::{Bernoulli, Gaussian};

@@ -5,13 +5,15 @@
 //! it is the light transport function `τ_n` (Thanikachalam et al. 2014, section 3).
 //!
 //! `recover`, `format` and `relight` share this module: the positions of pixels, windows and tiles ([`Geometry`]), the
-//! values of a tile as real numbers ([`FloatTile`]) and as codes ([`Tile`]), and the distance of two transports
-//! ([`SnrAccumulator`]).
+//! values of a tile as real numbers ([`FloatTile`]) and as codes ([`Tile`]), the distance of two transports
+//! ([`SnrAccumulator`]), and their singular values ([`SingularValueAnalysis`]).
 
 mod float_tile;
 mod function_codes;
 mod geometry;
+mod known_transport;
 mod quantisation;
+mod singular_values;
 mod snr;
 mod tile;
 
@@ -23,6 +25,8 @@ pub use geometry::{
     CHANNELS, CameraPixel, Correspondence, Extent, Geometry, GeometryError, LightElement,
     LightPosition, MAX_SIDE, MAX_WINDOW, TileRect, Window,
 };
+pub use known_transport::{KnownTransport, transport_error};
 pub(crate) use quantisation::ChannelPeaks;
+pub use singular_values::SingularValueAnalysis;
 pub use snr::{Decibels, SnrAccumulator};
 pub use tile::{CoefficientCodes, TEXEL_COMPONENTS, TexelCodes, Tile, Transport};

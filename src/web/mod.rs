@@ -1,8 +1,8 @@
 //! The WebAssembly surface: thin wrappers of [`format`](crate::format) and [`relight`](crate::relight) for JavaScript.
 //!
-//! Each feature is a module that browsers load when they need it: the decoder, the recovery, and the backends CPU, WebGL2
-//! and WebGPU. Each module has its own memory, so a photograph is decoded in one and transferred to others. Every failure
-//! is thrown as a JavaScript `Error` with a `code` ([`CodedError`]).
+//! Each feature is a module that browsers load when they need it: the decoder, the recovery, the simulation of the site,
+//! and the backends CPU, WebGL2 and WebGPU. Each module has its own memory, so a photograph is decoded in one and
+//! transferred to others. Every failure is thrown as a JavaScript `Error` with a `code` ([`CodedError`]).
 
 #[cfg(feature = "cpu")]
 mod canvas2d;
@@ -13,10 +13,14 @@ mod error;
 mod graphics_device;
 mod photo;
 mod photo_transfer;
+#[cfg(any(feature = "recovery", feature = "simulation"))]
+mod progress;
 #[cfg(feature = "recovery")]
 mod recovery;
 #[cfg(feature = "cpu")]
 mod row_range_relighter;
+#[cfg(feature = "simulation")]
+mod simulation;
 /// What every module with a backend has.
 #[cfg(feature = "drawing")]
 mod drawing {
@@ -42,3 +46,5 @@ pub use recovery::{
 };
 #[cfg(feature = "cpu")]
 pub use row_range_relighter::{RowRangeRelighter, cpu_kernel};
+#[cfg(feature = "simulation")]
+pub use simulation::{Simulation, TransportAnalysis};

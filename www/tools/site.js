@@ -16,6 +16,8 @@ const repository = join(import.meta.dirname, '..', '..');
 /** The folders that are served, by their paths on the site. */
 export const FOLDERS = {
   '/relightable-photo/': 'dist',
+  // The first folder whose path matches is served.
+  '/site/wasm/': 'target/wasm/site',
   '/site/': 'www/site',
   '/samples/': 'docs/samples',
   '/docs/images/': 'docs/images',

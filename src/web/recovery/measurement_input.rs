@@ -4,7 +4,6 @@ use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::capture_files::PageFiles;
-use super::progress::{ReportingExecutor, report_job};
 use crate::calibrate::{GrayCodePhotos, LightPlaneAxis};
 use crate::capture::{
     CameraRowSet, CaptureFolder, LinearPhoto, Manifest, Measurements, NoiseModel, Pattern, Shot,
@@ -12,6 +11,7 @@ use crate::capture::{
 use crate::export::select_shots;
 use crate::transport::{CHANNELS, Correspondence, Extent};
 use crate::web::CodedError;
+use crate::web::progress::{ReportingExecutor, report_job};
 
 /// The measurements of a recovery, and what its file says of their origin.
 #[wasm_bindgen]

@@ -8,7 +8,6 @@ mod capture_files;
 mod error;
 mod linear_png;
 mod measurement_input;
-mod progress;
 mod recovered;
 mod recovery_job;
 mod tile_recovery;

@@ -6,7 +6,6 @@ use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::measurement_input::MeasurementInput;
-use super::progress::ReportingExecutor;
 use crate::capture::Measurements;
 use crate::export::{
     self, FileQuality, MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation,
@@ -16,6 +15,7 @@ use crate::recover::{
 };
 use crate::transport::{Basis, Decibels, Window};
 use crate::web::CodedError;
+use crate::web::progress::ReportingExecutor;
 
 /// A recovery that is prepared. Tiles can be recovered in any order, here or in other workers.
 #[wasm_bindgen]

@@ -1,12 +1,12 @@
 //! Simulated photographs of a scene, in memory.
 
-use super::known_transport::KnownTransport;
+use super::camera::{Camera, RandomStreamId};
+use super::emission_matrix::EmissionMatrix;
+use super::pattern_image::{PatternEnsemble, PatternImage, emission};
+use super::simulated_scene::SimulatedScene;
 use crate::capture::{CameraRowSet, LinearPhoto, Measurements, NoiseModel, Pattern};
 use crate::job_executor::Executor;
-use crate::simulate::{
-    Camera, EmissionMatrix, PatternEnsemble, PatternImage, RandomStreamId, SimulatedScene, emission,
-};
-use crate::transport::{CHANNELS, CameraPixel, Geometry};
+use crate::transport::{CHANNELS, CameraPixel, Geometry, KnownTransport};
 
 /// Photographs that noise is added to at once; bounds the memory for copies.
 const NOISE_BATCH: usize = 16;
@@ -42,11 +42,7 @@ impl SimulatedCapture<'_> {
         executor: &impl Executor,
     ) -> Measurements {
         let geometry = self.scene.geometry();
-        let draw = |i| {
-            let mut stream = RandomStreamId::Pattern(i).start(self.seed);
-            ensemble.draw(geometry.light, &mut stream)
-        };
-        let codes: Vec<_> = (0..count as u32).map(draw).collect();
+        let codes = self.pattern_codes(ensemble, count);
         let code = 1.0 / (Camera::WHITE - Camera::BLACK);
         let mut measurements = Measurements {
             camera: geometry.camera,
@@ -62,36 +58,63 @@ impl SimulatedCapture<'_> {
         measurements
     }
 
-    fn dark(&self) -> LinearPhoto {
+    /// Random patterns; those of a larger `count` begin with those of a smaller one.
+    pub(crate) fn pattern_codes(
+        &self,
+        ensemble: PatternEnsemble,
+        count: usize,
+    ) -> Vec<PatternImage> {
+        let draw = |i| {
+            let mut stream = RandomStreamId::Pattern(i).start(self.seed);
+            ensemble.draw(self.scene.geometry().light, &mut stream)
+        };
+        (0..count as u32).map(draw).collect()
+    }
+
+    /// A photograph under no light.
+    pub(crate) fn dark(&self) -> LinearPhoto {
         let black = vec![[0.0; CHANNELS]; self.scene.geometry().camera.area()];
         self.add_noise(&black, 0)
     }
 
     /// One photograph for each light, in units of the measurement, minus a dark photograph; saturated samples are NaN.
-    pub(super) fn photographs(
+    pub(crate) fn photographs(
+        &self,
+        lights: &[PatternImage],
+        executor: &impl Executor,
+    ) -> Vec<LinearPhoto> {
+        let mut photographs = self.raw_photographs(lights, executor);
+        let dark = self.dark();
+        for photograph in &mut photographs {
+            for (y, dark) in photograph.iter_mut().zip(&dark) {
+                *y = std::array::from_fn(|c| y[c] - dark[c]);
+            }
+        }
+        photographs
+    }
+
+    /// One photograph for each light, in units of the measurement; saturated samples are NaN.
+    pub(crate) fn raw_photographs(
         &self,
         lights: &[PatternImage],
         executor: &impl Executor,
     ) -> Vec<LinearPhoto> {
         let mut pictures = self.pictures(lights, executor);
-        let dark = self.dark();
         for (number, batch) in pictures.chunks_mut(NOISE_BATCH).enumerate() {
             let first = 1 + number * NOISE_BATCH;
             let noisy = executor.map(batch.len(), |i| {
                 self.add_noise(&batch[i], (first + i) as u32)
             });
-            for (picture, noisy) in batch.iter_mut().zip(noisy) {
-                *picture = noisy;
-                for (y, dark) in picture.iter_mut().zip(&dark) {
-                    *y = std::array::from_fn(|c| y[c] - dark[c]);
-                }
-            }
+            batch
+                .iter_mut()
+                .zip(noisy)
+                .for_each(|(picture, noisy)| *picture = noisy);
         }
         pictures
     }
 
     /// A photograph of `picture` with the noise of the photograph number `index`.
-    pub(super) fn add_noise(&self, picture: &LinearPhoto, index: u32) -> LinearPhoto {
+    pub(crate) fn add_noise(&self, picture: &LinearPhoto, index: u32) -> LinearPhoto {
         let mut noise = RandomStreamId::Photograph(index).start(self.seed);
         let electrons = self.electrons;
         let codes = Camera { electrons }.photograph(picture, &mut noise);
@@ -126,7 +149,7 @@ impl SimulatedCapture<'_> {
 }
 
 /// The pattern that the monitor emits for `codes`.
-fn emitted_pattern(codes: &PatternImage) -> Pattern {
+pub fn emitted_pattern(codes: &PatternImage) -> Pattern {
     let linear = |code: &u8| emission(*code) as f32;
     match codes {
         PatternImage::Grey(codes) => Pattern::Grey(codes.iter().map(linear).collect()),
