@@ -180,6 +180,27 @@ test('the result answers questions', async ({ openPage, step }) => {
         expect(value).toBeCloseTo(pairs[1]?.[i] ?? 0, 5);
     },
   );
+  await step('tiles have the light transport functions of all pixels', async () => {
+    const { pixels, pairs } = await page.evaluate(async () => {
+      const { recovered } = /** @type {any} */ (globalThis);
+      const area = 3 * recovered.window ** 2;
+      let pixels = 0;
+      const pairs = [];
+      for (let index = 0; ; index += 1) {
+        const tile = await recovered.tileFunctions(index);
+        if (!tile) return { pixels, pairs };
+        pixels += tile.values.length / area;
+        const last = tile.width * tile.height - 1;
+        const own = await recovered.transportFunction(
+          tile.x + tile.width - 1,
+          tile.y + tile.height - 1,
+        );
+        pairs.push([[...tile.values.slice(last * area)], [...own.values]]);
+      }
+    });
+    expect(pixels).toBe(64 * 64);
+    for (const [tile, own] of pairs) expect(tile).toStrictEqual(own);
+  });
   await step('photographs are compared with the pictures under their patterns', async () => {
     const snr = await page.evaluate(async () => {
       const { recovered, folder } = /** @type {any} */ (globalThis);

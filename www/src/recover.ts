@@ -36,6 +36,7 @@ export type {
   RecoveryWarning,
   RecoveryWarningCode,
   SparsityBasis,
+  TileFunctions,
   TransportFunction,
 } from './recover/types.js';
 export { type ErrorCode, PhotoError } from './shared/errors.js';

@@ -159,6 +159,13 @@ impl RecoveredTransport {
         vec![origin.u, origin.v]
     }
 
+    /// Column and row of the first pixel of a tile, its width and its height; nothing if there is no such tile.
+    #[wasm_bindgen(js_name = tileRect)]
+    pub fn tile_rect(&self, index: usize) -> Option<Vec<u32>> {
+        let rect = self.transport.tiles.get(index)?.rect();
+        Some(vec![rect.x, rect.y, rect.extent.width, rect.extent.height])
+    }
+
     /// The light transport functions of a tile, `[pixel, S, 3]`.
     ///
     /// # Errors

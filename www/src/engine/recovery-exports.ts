@@ -85,6 +85,8 @@ export interface RecoveredTransport extends Freeable {
   transportFunction(x: number, y: number): Float32Array;
   windowOrigin(x: number, y: number): Int32Array;
   pointScatteringFunction(u: number, v: number): Float32Array;
+  tileRect(index: number): Uint32Array | undefined;
+  tileFunctions(index: number): Float32Array;
 }
 
 /** A PNG that is decoded. */

@@ -24,7 +24,7 @@ import {
   type RecoverySummary,
   type SentPicture,
 } from './protocol.js';
-import type { Correspondence, FileQuality, TransportFunction } from './types.js';
+import type { Correspondence, FileQuality, TileFunctions, TransportFunction } from './types.js';
 
 /** Of pictures that are compared with a photograph that was recovered from a folder. */
 const DEFAULT_CODES = { lightGamma: DEFAULT_GAMMA, black: 0, white: MAX_CODE };
@@ -152,6 +152,14 @@ export class Coordinator implements CoordinatorCalls {
 
   pointScatteringFunction(u: number, v: number): Float32Array {
     return existing(this.#transport).pointScatteringFunction(u, v);
+  }
+
+  tileFunctions(index: number): TileFunctions | undefined {
+    const transport = existing(this.#transport);
+    const rect = transport.tileRect(index);
+    if (!rect) return undefined;
+    const [x = 0, y = 0, width = 0, height = 0] = rect;
+    return { x, y, width, height, values: transport.tileFunctions(index) };
   }
 
   evaluatePair(

@@ -7,6 +7,7 @@ import type {
   FileQuality,
   RecoveryMethod,
   SparsityBasis,
+  TileFunctions,
   TransportFunction,
 } from './types.js';
 
@@ -109,6 +110,8 @@ export interface CoordinatorCalls {
   relight(light: Float32Array): Float32Array;
   transportFunction(x: number, y: number): TransportFunction;
   pointScatteringFunction(u: number, v: number): Float32Array;
+  /** `undefined` after the last tile. */
+  tileFunctions(index: number): TileFunctions | undefined;
   evaluatePair(
     index: number,
     light: SentPicture,

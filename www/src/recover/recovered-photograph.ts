@@ -21,6 +21,7 @@ import type {
   ProgressOptions,
   RecoveredPhotograph,
   RecoveryWarning,
+  TileFunctions,
   TransportFunction,
 } from './types.js';
 import { describeWarnings } from './warnings.js';
@@ -118,6 +119,10 @@ export class CoordinatedPhotograph implements RecoveredPhotograph {
 
   pointScatteringFunction(u: number, v: number): Promise<Float32Array> {
     return this.#call('pointScatteringFunction', [u, v]);
+  }
+
+  tileFunctions(index: number): Promise<TileFunctions | undefined> {
+    return this.#call('tileFunctions', [index]);
   }
 
   free(): void {

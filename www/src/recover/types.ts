@@ -154,6 +154,17 @@ export interface TransportFunction {
   readonly values: Float32Array;
 }
 
+/** The light transport functions of a rectangle of camera pixels. */
+export interface TileFunctions {
+  /** Column and row of the first pixel. */
+  readonly x: number;
+  readonly y: number;
+  readonly width: number;
+  readonly height: number;
+  /** Red, green and blue of each element of each pixel's window; pixels and elements row by row. */
+  readonly values: Float32Array;
+}
+
 /** A recovered photograph. It holds a worker and memory until it is freed. */
 export interface RecoveredPhotograph extends PhotographSource {
   readonly width: number;
@@ -189,6 +200,8 @@ export interface RecoveredPhotograph extends PhotographSource {
   transportFunction(x: number, y: number): Promise<TransportFunction>;
   /** Linear RGB of the picture when the light element in column u and row v alone is on. */
   pointScatteringFunction(u: number, v: number): Promise<Float32Array>;
+  /** The light transport functions of a tile; `undefined` after the last. */
+  tileFunctions(index: number): Promise<TileFunctions | undefined>;
   /** Ends its worker and frees its memory. Elements that show it keep their copies. */
   free(): void;
 }
