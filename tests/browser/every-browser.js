@@ -14,6 +14,7 @@ import {
   waitForEvents,
   waitForLoad,
 } from './page-helpers.js';
+import { testRecoverPage } from './recover-page-every-browser.js';
 import { prepareRecovery, recoverFixture } from './recovery-page.js';
 import { glassBytes, LIGHTS, nativePicture } from './test-photos.js';
 
@@ -42,6 +43,8 @@ export function testEveryBrowser(test, browser) {
   const { missingProgram, backends, missingBackends, canReadScreen, hasRendererNames } = browser;
   if (missingProgram && process.env['CI']) throw new Error(`not installed: ${missingProgram}`);
   test.skip(missingProgram !== null, `NOT TESTED, not installed: ${missingProgram}`);
+
+  testRecoverPage(test);
 
   test.describe('relighting', () => {
     for (const backend of backends) {

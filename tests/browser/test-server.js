@@ -10,6 +10,7 @@ import { answer } from '../../www/tools/ranges.js';
 import { listen } from '../../www/tools/serve.js';
 import { CONTENT_SECURITY_POLICY, site } from '../../www/tools/site.js';
 import { monitorPage } from './page-monitor.js';
+import { zipFixture } from './recovery-page.js';
 import { FOLDER, glassBytes } from './test-photos.js';
 
 /** @typedef {import('node:http').ServerResponse} Response */
@@ -166,6 +167,8 @@ const HANDLERS = {
     response.end(glassBytes().subarray(1, 101));
   },
   '/faults/refused': (response) => response.writeHead(416).end(),
+  '/glass-s.zip': async (response) =>
+    response.writeHead(200, { 'Content-Type': 'application/zip' }).end(await zipFixture()),
   '/half.png': send('image/png', () => HALF_WHITE),
   '/film.webm': (response, request) =>
     sendRange(response, request, { etag: '"film"', bytes: FILM, type: 'video/webm' }),

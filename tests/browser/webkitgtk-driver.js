@@ -71,7 +71,7 @@ export async function launchWebKitGtk(driver) {
       },
       /** Leaves the page, and returns what it complained of. @returns {Promise<string[]>} */
       leavePage: async () => {
-        const complaints = await page.evaluate('complaints');
+        const complaints = await page.evaluate('globalThis.complaints ?? []');
         await command('DELETE', '/actions');
         await command('POST', '/url', { url: 'about:blank' });
         return complaints;

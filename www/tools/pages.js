@@ -15,6 +15,7 @@ const PAGES_FOLDER = 'www/pages';
 const OWN_PAGES = [
   { href: 'index.html', title: 'Gallery' },
   { href: 'playground.html', title: 'Playground' },
+  { href: 'recover.html', title: 'Recover' },
   { href: 'how-it-works.html', title: 'How it works' },
 ];
 /** The menu's entry for all documents leads to the first one. */

@@ -1,0 +1,49 @@
+/** Messages of the page's scripts. The page itself has the other English texts, under `data-text`. */
+
+export default {
+  'job.simulating': 'Simulating the photographs',
+  'job.reading': 'Reading the capture',
+  'job.preparing': 'Learning from all photographs',
+  'job.recovering': 'Recovering the transport',
+  'job.encoding': 'Writing the file',
+  'job.left': '{seconds} s left',
+  'job.cancelled': 'Cancelled.',
+  'job.hidden':
+    'The tab is hidden, so the browser may slow the work down; it goes on when you return.',
+  'done.simulated': 'Recovered from {patterns} patterns in {seconds} s: SNR {snr} dB.',
+  'done.own': 'Recovered from {patterns} photographs in {seconds} s.',
+  'done.file': 'The file has {size} MB.',
+  'fact.size': '{width} × {height} pixels, {lightWidth} × {lightHeight} light elements',
+  'fact.patterns': '{patterns} patterns',
+  'fact.window': 'window {window} × {window}',
+  'fact.rank': 'rank {rank}',
+  'fact.snr': 'SNR {snr} dB against the true transport',
+  'fact.expected': 'SNR {snr} dB expected',
+  'fact.heldOut': 'SNR {snr} dB on pictures that the recovery did not use',
+  'own.files': '{name}: {files} files',
+  'own.estimate': 'Recovery takes about {memory} MB of memory and {seconds} s.',
+  'point.text':
+    'Pixel {x}, {y} and light element {u}, {v}: 90 % of its light comes from {elements} of {all} elements of the window.',
+  'point.snr': 'The pictures under this light: SNR {snr} dB.',
+  'picture.true': 'True picture under a spot of light at {x} %, {y} %',
+  'picture.recovered': 'Recovered picture under a spot of light at {x} %, {y} %',
+  'picture.error': 'Difference of the two pictures: SNR {snr} dB',
+  'function.true': 'True light transport function of pixel {x}, {y}',
+  'function.recovered': 'Recovered light transport function of pixel {x}, {y}',
+  'window.map':
+    'Light plane of {width} × {height} elements; the window of {window} × {window} elements starts at {u}, {v}',
+  'scattering.true': 'True picture when only light element {u}, {v} is on',
+  'scattering.recovered': 'Recovered picture when only light element {u}, {v} is on',
+  'band.label':
+    'The matrix with {pixels} pixels and {elements} light elements: bright diagonal stripes on black',
+  'snr.axis': 'SNR in dB',
+  'snr.label': 'SNR by the number of patterns: {points}',
+  'snr.point': '{patterns} patterns: {snr} dB',
+  'singular.axis': 'relative to the largest',
+  'singular.number': 'number',
+  'singular.label':
+    'Singular values relative to the largest: the one in the middle is {middle}, the last {last}',
+  'singular.block': 'Shown for the {width} × {height} light elements in the middle.',
+  'singular.all': 'Shown for all {width} × {height} light elements and all three channels.',
+  'fault.code': 'Code: {code}',
+};
