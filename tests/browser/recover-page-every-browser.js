@@ -56,7 +56,7 @@ async function recoverSimulated(page, patterns) {
       slider.dispatchEvent(new Event(type, { bubbles: true }));
     const start = document.getElementById('start');
     // After the first recovery, the change starts the next.
-    if (document.getElementById('job')?.hidden) start?.click();
+    if (!document.getElementById('recover')?.hasAttribute('data-running')) start?.click();
   }, patterns);
   const said = await waitForText(
     page,

@@ -22,14 +22,13 @@ function pageTexts() {
   return [...html.matchAll(/data-text="([^"]+)"/g)].map(([, key = '']) => key);
 }
 
-/** Recovers from so many patterns, and returns the SNR. @param {Page} page @param {number} patterns */
+/** Recovers from so many patterns. @param {Page} page @param {number} patterns */
 async function recover(page, patterns) {
   await page.getByLabel('Patterns', { exact: true }).fill(String(patterns));
   const start = page.getByRole('button', { name: 'Recover', exact: true });
-  if (await page.locator('#job').isHidden()) await start.click();
-  const done = page.getByText(new RegExp(`Recovered from ${patterns} patterns in [\\d.]+ s: SNR`));
-  await done.waitFor({ state: 'attached', timeout: 100_000 });
-  return Number(/SNR ([\d.]+)/.exec((await done.textContent()) ?? '')?.[1]);
+  if (await page.locator('#cancel').isHidden()) await start.click();
+  const done = new RegExp(`Recovered from ${patterns} patterns in [\\d.]+ s: SNR -?[\\d.]+ dB`);
+  await expect(page.locator('#announcement')).toHaveText(done, { timeout: 100_000 });
 }
 
 /** The linear sum of a canvas's codes at the left and at the right. @param {Page} page @param {string} id */
@@ -141,7 +140,7 @@ test.describe('a simulated object', () => {
       await page.getByLabel('Method').first().selectOption('nnls');
       await page.getByRole('button', { name: 'Cancel' }).click();
       await expect(announced).toHaveText('Cancelled.');
-      await expect(page.locator('#job')).toBeHidden();
+      await expect(page.locator('#cancel')).toBeHidden();
       await expect(start).toBeFocused();
       await recover(page, 10);
     });
@@ -198,7 +197,9 @@ test.describe('an own capture', () => {
 
     await step('the element shows it', async () => {
       await page.locator('relightable-photo canvas').waitFor();
-      await expect(page.locator('#true-picture')).toBeHidden();
+      for (const id of ['true-picture', 'accuracy']) {
+        await expect(page.locator(`#${id}`)).toBeHidden();
+      }
       await expect(page.locator('#recovered-picture')).toBeVisible();
     });
 

@@ -1,6 +1,6 @@
-/** One job at a time: its progress, its end, and its faults. */
+/** One job at a time: its progress, its end, and its faults. Its place on the page stays when it ends. */
 
-import { t } from './language.js';
+import { onLanguageChange, t } from './language.js';
 
 /** Shortest time between two messages for screen readers. */
 const ANNOUNCEMENT_INTERVAL_MS = 5000;
@@ -13,8 +13,8 @@ export class Job {
     sweep: /** @type {HTMLButtonElement} */ (document.getElementById('sweep')),
     cancel: /** @type {HTMLButtonElement} */ (document.getElementById('cancel')),
   };
-  #view = /** @type {HTMLElement} */ (document.getElementById('job'));
-  #bar = /** @type {HTMLProgressElement} */ (this.#view.querySelector('progress'));
+  #page = /** @type {HTMLElement} */ (document.getElementById('recover'));
+  #bar = /** @type {HTMLProgressElement} */ (document.querySelector('#job progress'));
   #text = /** @type {HTMLElement} */ (document.getElementById('job-text'));
   #announcement = /** @type {HTMLElement} */ (document.getElementById('announcement'));
   #fault = /** @type {HTMLElement} */ (document.getElementById('fault'));
@@ -25,11 +25,13 @@ export class Job {
   constructor() {
     this.#buttons.cancel.addEventListener('click', () => {
       this.cancel();
-      this.announce(t('job.cancelled'));
-      this.#buttons.start.focus();
+      this.#tellEnd(t('job.cancelled'));
     });
     document.addEventListener('visibilitychange', () => {
       if (this.#running && document.hidden) this.#text.textContent = t('job.hidden');
+    });
+    onLanguageChange(() => {
+      if (!this.#running) this.#tellEnd('');
     });
   }
 
@@ -74,9 +76,12 @@ export class Job {
           if (this.#running === controller) this.#report(key, share, secondsLeft);
         },
       });
-      if (this.#running === controller) this.announce(done);
+      if (this.#running === controller) this.#tellEnd(done);
     } catch (error) {
-      if (!controller.signal.aborted) this.#showFault(/** @type {Error} */ (error));
+      if (!controller.signal.aborted) {
+        this.#text.textContent = '';
+        this.#showFault(/** @type {Error} */ (error));
+      }
     } finally {
       // A later job may have begun.
       if (this.#running === controller) {
@@ -84,6 +89,12 @@ export class Job {
         this.#showRunning(false);
       }
     }
+  }
+
+  /** Shows how a job ended until the next. @param {string} message */
+  #tellEnd(message) {
+    this.#text.textContent = message;
+    this.announce(message);
   }
 
   /** Shows a fault that ended a job, with its code. @param {Error & { code?: string }} error */
@@ -117,8 +128,9 @@ export class Job {
 
   /** @param {boolean} isRunning */
   #showRunning(isRunning) {
-    this.#view.hidden = !isRunning;
-    this.#buttons.cancel.hidden = !isRunning;
-    document.getElementById('recover')?.toggleAttribute('data-running', isRunning);
+    const { cancel, start } = this.#buttons;
+    // The style hides a button that cannot be pressed.
+    if (!isRunning && document.activeElement === cancel) start.focus();
+    this.#page.toggleAttribute('data-running', isRunning);
   }
 }

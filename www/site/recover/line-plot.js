@@ -1,7 +1,9 @@
 /** A line plot as SVG, as wide as its container. */
 
 const NAMESPACE = 'http://www.w3.org/2000/svg';
-const MARGIN = { left: 56, right: 16, top: 14, bottom: 48 };
+const MARGIN = { left: 40, right: 16, top: 14, bottom: 48 };
+/** Width of a digit. */
+const DIGIT_WIDTH = 8;
 const HEIGHT = 300;
 const MIN_WIDTH = 260;
 const MAX_WIDTH = 760;
@@ -15,7 +17,8 @@ export const SERIES_STYLES = 5;
 /** Draws a plot into a container, in place of the last. @param {HTMLElement} container @param {Plot} plot */
 export function drawPlot(container, { label, x, y, series }) {
   const width = Math.max(MIN_WIDTH, Math.min(MAX_WIDTH, container.clientWidth || MAX_WIDTH));
-  const [left, right] = [MARGIN.left, width - MARGIN.right];
+  const longest = Math.max(...y.ticks.map((value) => y.format(value).length));
+  const [left, right] = [MARGIN.left + DIGIT_WIDTH * longest, width - MARGIN.right];
   const [top, bottom] = [MARGIN.top, HEIGHT - MARGIN.bottom];
   const at = {
     x: (/** @type {number} */ value) => left + share(x, value) * (right - left),

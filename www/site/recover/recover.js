@@ -88,8 +88,8 @@ async function solveSimulated(options) {
   const settings = simulated.settings();
   const { key, names } = simulated.line(settings);
   const { result, snr } = await simulated.recover(settings, options);
-  plot.add(key, names, settings.patterns, snr);
   show(result);
+  plot.add(key, names, settings.patterns, snr);
   return t('done.simulated', {
     patterns: settings.patterns,
     seconds: formatNumber(result.recovered.seconds, 1),

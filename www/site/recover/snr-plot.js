@@ -43,7 +43,8 @@ export class SnrPlot {
       hasMarkers: true,
     }));
     const all = series.flatMap(({ points }) => points);
-    const ticks = roundTicks(Math.max(10, ...all.map(({ y }) => y)));
+    // Room above the highest point.
+    const ticks = roundTicks(Math.max(10, ...all.map(({ y }) => y + 1)));
     const points = series.at(-1)?.points ?? [];
     const described = points.map(({ x, y }) =>
       t('snr.point', { patterns: x, snr: formatNumber(y, 1) }),

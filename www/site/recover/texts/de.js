@@ -24,6 +24,7 @@ export default {
   'noise.high': 'viel',
   method: 'Verfahren',
   'method.learned': 'Gelernter Prior',
+  more: 'Weitere Einstellungen',
   window: 'Fenster',
   'window.auto': 'geschätzt',
   'own.help': 'Ein Aufnahmeordner enthält capture.json, Muster und lineare 16-Bit-Fotografien.',
@@ -85,7 +86,7 @@ export default {
   'own.files': '{name}: {files} Dateien',
   'own.estimate': 'Die Wiederherstellung braucht etwa {memory} MB Speicher und {seconds} s.',
   'point.text':
-    'Pixel {x}, {y} und Lichtelement {u}, {v}: 90 % seines Lichts kommen von {elements} der {all} Elemente des Fensters.',
+    'Pixel {x}, {y} und Lichtelement {u}, {v}: 90\u00a0% seines Lichts kommen von {elements} der {all} Elemente des Fensters.',
   'point.snr': 'Die Bilder unter diesem Licht: SNR {snr} dB.',
   'picture.true': 'Wahres Bild unter einem Lichtfleck bei {x} %, {y} %',
   'picture.recovered': 'Wiederhergestelltes Bild unter einem Lichtfleck bei {x} %, {y} %',

@@ -23,7 +23,7 @@ export default {
   'own.files': '{name}: {files} files',
   'own.estimate': 'Recovery takes about {memory} MB of memory and {seconds} s.',
   'point.text':
-    'Pixel {x}, {y} and light element {u}, {v}: 90 % of its light comes from {elements} of {all} elements of the window.',
+    'Pixel {x}, {y} and light element {u}, {v}: 90\u00a0% of its light comes from {elements} of {all} elements of the window.',
   'point.snr': 'The pictures under this light: SNR {snr} dB.',
   'picture.true': 'True picture under a spot of light at {x} %, {y} %',
   'picture.recovered': 'Recovered picture under a spot of light at {x} %, {y} %',

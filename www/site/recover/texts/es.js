@@ -24,6 +24,7 @@ export default {
   'noise.high': 'alto',
   method: 'Método',
   'method.learned': 'Distribución aprendida',
+  more: 'Más ajustes',
   window: 'Ventana',
   'window.auto': 'estimada',
   'own.help':
@@ -86,7 +87,7 @@ export default {
   'own.files': '{name}: {files} archivos',
   'own.estimate': 'La recuperación necesita unos {memory} MB de memoria y {seconds} s.',
   'point.text':
-    'Píxel {x}, {y} y elemento de luz {u}, {v}: el 90 % de su luz viene de {elements} de los {all} elementos de la ventana.',
+    'Píxel {x}, {y} y elemento de luz {u}, {v}: el 90\u00a0% de su luz viene de {elements} de los {all} elementos de la ventana.',
   'point.snr': 'Las imágenes bajo esta luz: SNR {snr} dB.',
   'picture.true': 'Imagen verdadera bajo una mancha de luz en {x} %, {y} %',
   'picture.recovered': 'Imagen recuperada bajo una mancha de luz en {x} %, {y} %',

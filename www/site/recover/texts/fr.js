@@ -24,6 +24,7 @@ export default {
   'noise.high': 'fort',
   method: 'Méthode',
   'method.learned': 'A priori appris',
+  more: 'Autres réglages',
   window: 'Fenêtre',
   'window.auto': 'estimée',
   'own.help':
@@ -86,7 +87,7 @@ export default {
   'own.files': '{name} : {files} fichiers',
   'own.estimate': 'La reconstruction prend environ {memory} Mo de mémoire et {seconds} s.',
   'point.text':
-    'Pixel {x}, {y} et élément lumineux {u}, {v} : 90 % de sa lumière vient de {elements} des {all} éléments de la fenêtre.',
+    'Pixel {x}, {y} et élément lumineux {u}, {v} : 90\u00a0% de sa lumière vient de {elements} des {all} éléments de la fenêtre.',
   'point.snr': 'Les images sous cette lumière : SNR {snr} dB.',
   'picture.true': 'Vraie image sous une tache de lumière à {x} %, {y} %',
   'picture.recovered': 'Image reconstruite sous une tache de lumière à {x} %, {y} %',

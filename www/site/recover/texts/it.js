@@ -24,6 +24,7 @@ export default {
   'noise.high': 'alto',
   method: 'Metodo',
   'method.learned': 'Prior appreso',
+  more: 'Altre impostazioni',
   window: 'Finestra',
   'window.auto': 'stimata',
   'own.help':
@@ -86,7 +87,7 @@ export default {
   'own.files': '{name}: {files} file',
   'own.estimate': 'La ricostruzione richiede circa {memory} MB di memoria e {seconds} s.',
   'point.text':
-    'Pixel {x}, {y} ed elemento luminoso {u}, {v}: il 90 % della sua luce viene da {elements} dei {all} elementi della finestra.',
+    'Pixel {x}, {y} ed elemento luminoso {u}, {v}: il 90\u00a0% della sua luce viene da {elements} dei {all} elementi della finestra.',
   'point.snr': 'Le immagini sotto questa luce: SNR {snr} dB.',
   'picture.true': 'Immagine vera sotto una macchia di luce a {x} %, {y} %',
   'picture.recovered': 'Immagine ricostruita sotto una macchia di luce a {x} %, {y} %',

@@ -24,6 +24,7 @@ export default {
   'noise.high': '多い',
   method: '方法',
   'method.learned': '学習した事前分布',
+  more: 'その他の設定',
   window: '窓',
   'window.auto': '推定',
   'own.help': '撮影フォルダーには capture.json、パターン、16 ビットの線形な写真が入っています。',
@@ -83,7 +84,7 @@ export default {
   'own.files': '{name}：{files} ファイル',
   'own.estimate': '復元にはメモリー約 {memory} MB、約 {seconds} 秒が必要です。',
   'point.text':
-    '画素 {x}, {y} と光要素 {u}, {v}：光の 90 % は窓の {all} 要素のうち {elements} 要素から来ます。',
+    '画素 {x}, {y} と光要素 {u}, {v}：光の 90\u00a0% は窓の {all} 要素のうち {elements} 要素から来ます。',
   'point.snr': 'この光での画像の SNR は {snr} dB です。',
   'picture.true': '{x} %, {y} % の光の斑点のもとでの真の画像',
   'picture.recovered': '{x} %, {y} % の光の斑点のもとでの復元した画像',

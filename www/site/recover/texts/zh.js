@@ -24,6 +24,7 @@ export default {
   'noise.high': '高',
   method: '方法',
   'method.learned': '学习的先验',
+  more: '更多设置',
   window: '窗口',
   'window.auto': '自动估计',
   'own.help': '拍摄文件夹包含 capture.json、图案和 16 位线性照片。',
@@ -81,7 +82,7 @@ export default {
   'own.files': '{name}：{files} 个文件',
   'own.estimate': '恢复大约需要 {memory} MB 内存和 {seconds} 秒。',
   'point.text':
-    '像素 {x}, {y} 和光元素 {u}, {v}：90 % 的光来自窗口 {all} 个元素中的 {elements} 个。',
+    '像素 {x}, {y} 和光元素 {u}, {v}：90\u00a0% 的光来自窗口 {all} 个元素中的 {elements} 个。',
   'point.snr': '在这盏灯下两幅图像的 SNR 为 {snr} dB。',
   'picture.true': '光斑在 {x} %, {y} % 时的真实图像',
   'picture.recovered': '光斑在 {x} %, {y} % 时的恢复图像',
