@@ -54,6 +54,8 @@ export default defineConfig<object, WorkerOptions>({
     trace: { mode: 'retain-on-failure', screenshots: false, snapshots: false },
   },
   projects: [
+    // First, so that Chromium's tests keep the other worker busy meanwhile.
+    { name: 'webkitgtk', testMatch: 'webkitgtk.spec.ts', workers: 1 },
     {
       name: 'chromium',
       testIgnore,
@@ -84,6 +86,5 @@ export default defineConfig<object, WorkerOptions>({
         needsDisplay: Boolean(process.env['FIREFOX']),
       },
     },
-    { name: 'webkitgtk', testMatch: 'webkitgtk.spec.ts', workers: 1 },
   ],
 });
