@@ -77,7 +77,7 @@ test.describe('relighting', () => {
   test('workers and the main thread draw identical pictures', async ({ openPage }) => {
     const pooled = await openPage('/plain');
     const single = await openPage('/plain', { before: removeWorkers });
-    for (const src of [SRC, '/photos/stained-glass.ltm']) {
+    for (const src of [SRC, '/photos/tall.ltm']) {
       for (const page of [pooled, single]) {
         await page.evaluate('globalThis.photo?.remove()');
         await mountPhoto(page, { src, backend: 'cpu' });
