@@ -24,7 +24,7 @@ function pageTexts() {
 
 /** Recovers from so many patterns. @param {Page} page @param {number} patterns */
 async function recover(page, patterns) {
-  await page.getByLabel('Patterns', { exact: true }).fill(String(patterns));
+  await page.locator('#patterns').fill(String(patterns));
   const start = page.getByRole('button', { name: 'Recover', exact: true });
   if (await page.locator('#cancel').isHidden()) await start.click();
   const done = new RegExp(`Recovered from ${patterns} patterns in [\\d.]+ s: SNR -?[\\d.]+ dB`);

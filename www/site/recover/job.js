@@ -1,6 +1,7 @@
 /** One job at a time: its progress, its end, and its faults. Its place on the page stays when it ends. */
 
 import { onLanguageChange, t } from './language.js';
+import { PageFault } from './page-fault.js';
 
 /** Shortest time between two messages for screen readers. */
 const ANNOUNCEMENT_INTERVAL_MS = 5000;
@@ -98,11 +99,16 @@ export class Job {
   }
 
   /** Shows a fault that ended a job, with its code. @param {Error & { code?: string }} error */
-  #showFault({ message, code }) {
+  #showFault(error) {
+    const { message, code } = error;
     const text = document.createElement('p');
-    // The library's messages are English.
-    text.lang = 'en';
-    text.textContent = message;
+    if (error instanceof PageFault) {
+      text.textContent = t(`fault.${code}`, error.values);
+    } else {
+      // The library's messages are English.
+      text.lang = 'en';
+      text.textContent = message;
+    }
     const shown = [text];
     if (code) {
       const codeText = document.createElement('p');

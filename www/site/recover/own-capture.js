@@ -1,7 +1,8 @@
 /** Recovery of the visitor's own capture, from a folder or a zip file. */
 
-import { formatNumber, onLanguageChange, t } from './language.js';
-import { recoverModule, recoverSettings, recoverWith } from './recovery.js';
+import { recoverCapture } from './capture-recovery.js';
+import { onLanguageChange, t } from './language.js';
+import { recoverModule, recoverSettings } from './recovery.js';
 
 /** Of the shots of a folder so many are held out. */
 const HELD_OUT_SHARE = 0.1;
@@ -9,7 +10,7 @@ const HELD_OUT_SHARE = 0.1;
 /**
  * @typedef {import('./types.js').Result} Result
  * @typedef {import('./types.js').ReportStage} ReportStage
- * @typedef {{ name: string, files: ReadonlyMap<string, Blob> }} Capture
+ * @typedef {import('./capture-recovery.js').Capture} Capture
  */
 
 export class OwnCapture {
@@ -78,18 +79,7 @@ export class OwnCapture {
    */
   async recover({ signal, report }) {
     if (!this.#capture) throw new Error('no capture was chosen');
-    const { name, files } = this.#capture;
-    const recovered = await recoverWith({ folder: files }, this.#settings(), { signal, report });
-    const heldOut = await recovered.evaluateHeldOut();
-    return {
-      recovered,
-      truth: undefined,
-      name: name.replace(/\.zip$/i, '') || 'capture',
-      facts: () => [
-        t('fact.patterns', { patterns: recovered.shotsUsed.length }),
-        ...(heldOut === undefined ? [] : [t('fact.heldOut', { snr: formatNumber(heldOut, 1) })]),
-      ],
-    };
+    return recoverCapture(this.#capture, this.#settings(), { signal, report });
   }
 
   #settings() {

@@ -1,9 +1,11 @@
 /** The page "Recover": from photographs to a relightable photograph, and what it shows. */
 
+import { CameraCapture } from './camera/camera-capture.js';
 import { Job } from './job.js';
 import { formatNumber, onLanguageChange, startLanguages, t } from './language.js';
 import { OwnCapture } from './own-capture.js';
 import { recoverModule } from './recovery.js';
+import { saveFile } from './save-file.js';
 import { SimulatedObject, SWEEP_PATTERNS } from './simulated.js';
 import { SnrPlot } from './snr-plot.js';
 import { Structure } from './structure.js';
@@ -40,35 +42,44 @@ const own = new OwnCapture({
     }),
   onChange: updateButtons,
 });
+const camera = new CameraCapture({
+  run: (work) => job.run(work),
+  onChange: updateButtons,
+  onCapture: recoverPhotographs,
+});
 
 source.addEventListener('change', () => {
   job.cancel();
   showSource();
 });
 byId('start').addEventListener('click', () => {
-  if (isSimulated()) recoverSimulated();
-  else recoverOwn();
+  if (chosenSource() === 'simulated') recoverSimulated();
+  else recoverPhotographs();
 });
 byId('sweep').addEventListener('click', sweep);
 byId('save').addEventListener('click', save);
 onLanguageChange(showFacts);
 showSource();
 
-function isSimulated() {
+/** @returns {'simulated' | 'own' | 'camera'} */
+function chosenSource() {
   const checked = /** @type {HTMLInputElement | null} */ (source.querySelector(':checked'));
-  return checked?.value === 'simulated';
+  return /** @type {'simulated' | 'own' | 'camera'} */ (checked?.value ?? 'simulated');
 }
 
 function showSource() {
-  byId('simulated').hidden = !isSimulated();
-  byId('own').hidden = isSimulated();
+  const chosen = chosenSource();
+  for (const name of ['simulated', 'own', 'camera']) byId(name).hidden = name !== chosen;
+  if (chosen !== 'camera') camera.close();
   // A drop can be read only while its event is handled: the scripts must be there before.
-  if (!isSimulated()) void recoverModule();
+  if (chosen !== 'simulated') void recoverModule();
   updateButtons();
 }
 
 function updateButtons() {
-  job.enable({ start: isSimulated() || own.isChosen, sweep: isSimulated() });
+  const chosen = chosenSource();
+  const canStart = { simulated: true, own: own.isChosen, camera: camera.hasCapture };
+  job.enable({ start: canStart[chosen], sweep: chosen === 'simulated' });
 }
 
 function recoverSimulated() {
@@ -110,9 +121,10 @@ function sweep() {
   });
 }
 
-function recoverOwn() {
+function recoverPhotographs() {
+  const photographs = chosenSource() === 'camera' ? camera : own;
   void recover(async (options) => {
-    const result = await own.recover(options);
+    const result = await photographs.recover(options);
     show(result);
     const { shotsUsed, seconds } = result.recovered;
     return t('done.own', { patterns: shotsUsed.length, seconds: formatNumber(seconds, 1) });
@@ -173,12 +185,7 @@ function save() {
       signal,
       onProgress: ({ fraction, secondsLeft }) => report('job.encoding', fraction, secondsLeft),
     });
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(file);
-    link.download = `${name}.ltm`;
-    link.click();
-    // The browser reads the address when it starts the download.
-    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+    saveFile(file, `${name}.ltm`);
     return t('done.file', { size: formatNumber(file.size / 1e6, 2) });
   });
 }

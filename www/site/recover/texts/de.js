@@ -108,4 +108,50 @@ export default {
   'singular.block': 'Gezeigt für die {width} × {height} Lichtelemente in der Mitte.',
   'singular.all': 'Gezeigt für alle {width} × {height} Lichtelemente und alle drei Kanäle.',
   'fault.code': 'Code: {code}',
+  'source.camera': 'Ihre Kamera und ein zweiter Bildschirm',
+  'camera.help':
+    'Stellen Sie etwas Durchscheinendes dicht vor einen zweiten Bildschirm, etwa farbiges Glas oder ein Blatt, richten Sie die Kamera darauf, und verdunkeln Sie den Raum. Die Seite zeigt dort Muster und fotografiert jedes davon; nichts wird gesendet. Video hat 8 Bit und ist verarbeitet, darum sind Rohdateien einer richtigen Kamera weit genauer: Das SNR auf Bildern, die nicht verwendet wurden, sagt, wie gut das Ergebnis ist.',
+  'camera.start': 'Kamera starten',
+  'camera.window': 'Musterfenster öffnen',
+  'camera.window.help':
+    'Schieben Sie das Musterfenster auf den zweiten Bildschirm und klicken Sie darauf: Dann füllt es ihn. Sein weißes Quadrat muss das Bild hier unten fast füllen, aufrecht und von vorn gesehen.',
+  'camera.device': 'Kamera',
+  'camera.photograph': 'Alle Muster fotografieren',
+  'camera.save': 'Fotografien speichern',
+  'job.photographing': 'Die Muster werden fotografiert',
+  'camera.started': 'Die Kamera läuft.',
+  'camera.title': 'In einem Browser fotografiert',
+  'camera.window.title': 'Muster',
+  'camera.window.opened': 'Das Musterfenster ist offen.',
+  'camera.paused':
+    'Angehalten, weil dieser Tab oder das Musterfenster verborgen ist; es geht weiter, sobald beide zu sehen sind.',
+  'camera.noise':
+    'Rauschen eines Einzelbilds: {noise} % des Höchstwerts. Jede Fotografie ist das Mittel von mindestens {frames} Einzelbildern.',
+  'camera.unlocked':
+    'Der Browser konnte das nicht festhalten: {settings}. Ändert es sich währenddessen, ist die Wiederherstellung weniger genau.',
+  'camera.exposure': 'Belichtung',
+  'camera.focus': 'Schärfe',
+  'camera.whiteBalance': 'Weißabgleich',
+  'camera.kept':
+    'Die Fotografien von {patterns} Mustern bleiben: Stellen Sie daraus wieder her, oder fotografieren Sie noch einmal.',
+  'camera.done': '{photographs} Fotografien wurden gemacht.',
+  'fault.camera-unsupported':
+    'Dieser Browser gibt der Seite keine Kamera. Nehmen Sie einen aktuellen Browser, und öffnen Sie die Seite über https.',
+  'fault.camera-refused':
+    'Die Seite darf die Kamera nicht benutzen. Erlauben Sie es in den Einstellungen des Browsers für diese Seite, und starten Sie die Kamera noch einmal.',
+  'fault.camera-missing':
+    'Es wurde keine Kamera gefunden. Schließen Sie eine an, und starten Sie sie noch einmal.',
+  'fault.camera-busy':
+    'Die Kamera liefert kein Bild. Schließen Sie andere Programme, die sie benutzen, und starten Sie sie noch einmal.',
+  'fault.camera-lost':
+    'Die Kamera ist verschwunden. Schließen Sie sie an, und starten Sie sie noch einmal.',
+  'fault.camera-saturated':
+    'Bei vollem Licht sind {percent} % des Bilds zu hell für die Kamera. Machen Sie den zweiten Bildschirm dunkler, oder nehmen Sie eine andere Kamera.',
+  'fault.camera-no-signal':
+    'Das Bild der Kamera ändert sich nicht mit den Mustern. Richten Sie die Kamera auf den zweiten Bildschirm, und lassen Sie das Musterfenster dort sichtbar.',
+  'fault.camera-unstable':
+    'Das Bild der Kamera steht nie still. Befestigen Sie Kamera und Objekt, und halten Sie anderes Licht fern.',
+  'fault.patterns-blocked':
+    'Der Browser hat das Musterfenster blockiert. Erlauben Sie dieser Seite neue Fenster, und öffnen Sie es noch einmal.',
+  'fault.patterns-closed': 'Das Musterfenster ist geschlossen. Öffnen Sie es noch einmal.',
 };

@@ -46,4 +46,38 @@ export default {
   'singular.block': 'Shown for the {width} × {height} light elements in the middle.',
   'singular.all': 'Shown for all {width} × {height} light elements and all three channels.',
   'fault.code': 'Code: {code}',
+  'job.photographing': 'Photographing the patterns',
+  'camera.started': 'The camera runs.',
+  'camera.title': 'Photographed in a browser',
+  'camera.window.title': 'Patterns',
+  'camera.window.opened': 'The pattern window is open.',
+  'camera.paused':
+    'Paused, because this tab or the pattern window is hidden; the photographs go on when both are visible.',
+  'camera.noise':
+    'Noise of one frame: {noise} % of full scale. Each photograph is the mean of at least {frames} frames.',
+  'camera.unlocked':
+    'The browser could not fix this: {settings}. If it changes meanwhile, the recovery is less accurate.',
+  'camera.exposure': 'exposure',
+  'camera.focus': 'focus',
+  'camera.whiteBalance': 'white balance',
+  'camera.kept':
+    'The photographs of {patterns} patterns are kept: recover from them, or photograph again.',
+  'camera.done': '{photographs} photographs were taken.',
+  'fault.camera-unsupported':
+    'This browser does not give the page a camera. Use a current browser, and open the page by https.',
+  'fault.camera-refused':
+    'The page may not use the camera. Allow it in the browser’s settings of this page, and start the camera again.',
+  'fault.camera-missing': 'No camera was found. Connect one, and start it again.',
+  'fault.camera-busy':
+    'The camera gives no picture. Close other programs that use it, and start it again.',
+  'fault.camera-lost': 'The camera has vanished. Connect it, and start it again.',
+  'fault.camera-saturated':
+    'Under full light {percent} % of the picture is too bright for the camera. Make the second screen darker, or use another camera.',
+  'fault.camera-no-signal':
+    'The camera’s picture does not change with the patterns. Point the camera at the second screen, and keep the pattern window visible there.',
+  'fault.camera-unstable':
+    'The camera’s picture is never still. Fix camera and object, and keep other light away.',
+  'fault.patterns-blocked':
+    'The browser has blocked the pattern window. Allow pop-up windows for this page, and open it again.',
+  'fault.patterns-closed': 'The pattern window is closed. Open it again.',
 };

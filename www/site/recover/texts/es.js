@@ -111,4 +111,48 @@ export default {
   'singular.all':
     'Mostrados para todos los {width} × {height} elementos de luz y los tres canales.',
   'fault.code': 'Código: {code}',
+  'source.camera': 'Su cámara y una segunda pantalla',
+  'camera.help':
+    'Ponga algo translúcido cerca de una segunda pantalla, por ejemplo vidrio de color o una hoja, apunte la cámara hacia ello y oscurezca la sala. La página muestra patrones en esa pantalla y fotografía cada uno; nada se envía. El vídeo tiene 8 bits y está procesado: los archivos sin procesar de una cámara de verdad son mucho más precisos. El SNR en imágenes no usadas dice cuánto vale el resultado.',
+  'camera.start': 'Iniciar la cámara',
+  'camera.window': 'Abrir la ventana de patrones',
+  'camera.window.help':
+    'Mueva la ventana de patrones a la segunda pantalla y haga clic en ella: entonces la llena. Su cuadrado blanco debe llenar casi toda la imagen de abajo, recto y visto de frente.',
+  'camera.device': 'Cámara',
+  'camera.photograph': 'Fotografiar todos los patrones',
+  'camera.save': 'Guardar las fotografías',
+  'job.photographing': 'Se fotografían los patrones',
+  'camera.started': 'La cámara funciona.',
+  'camera.title': 'Fotografiado en un navegador',
+  'camera.window.title': 'Patrones',
+  'camera.window.opened': 'La ventana de patrones está abierta.',
+  'camera.paused':
+    'En pausa, porque esta pestaña o la ventana de patrones está oculta; las fotografías siguen cuando ambas son visibles.',
+  'camera.noise':
+    'Ruido de un fotograma: {noise} % de la escala completa. Cada fotografía es la media de al menos {frames} fotogramas.',
+  'camera.unlocked':
+    'El navegador no pudo fijar esto: {settings}. Si cambia entretanto, el resultado es menos preciso.',
+  'camera.exposure': 'exposición',
+  'camera.focus': 'enfoque',
+  'camera.whiteBalance': 'balance de blancos',
+  'camera.kept':
+    'Se conservan las fotografías de {patterns} patrones: recupere a partir de ellas o fotografíe de nuevo.',
+  'camera.done': 'Se tomaron {photographs} fotografías.',
+  'fault.camera-unsupported':
+    'Este navegador no da una cámara a la página. Use un navegador actual y abra la página por https.',
+  'fault.camera-refused':
+    'La página no puede usar la cámara. Permítalo en los ajustes del navegador para esta página e inicie la cámara de nuevo.',
+  'fault.camera-missing': 'No se encontró ninguna cámara. Conecte una e iníciela de nuevo.',
+  'fault.camera-busy':
+    'La cámara no da imagen. Cierre otros programas que la usen e iníciela de nuevo.',
+  'fault.camera-lost': 'La cámara ha desaparecido. Conéctela e iníciela de nuevo.',
+  'fault.camera-saturated':
+    'Con toda la luz, el {percent} % de la imagen es demasiado claro para la cámara. Oscurezca la segunda pantalla o use otra cámara.',
+  'fault.camera-no-signal':
+    'La imagen de la cámara no cambia con los patrones. Apunte la cámara a la segunda pantalla y mantenga visible allí la ventana de patrones.',
+  'fault.camera-unstable':
+    'La imagen de la cámara nunca está quieta. Fije la cámara y el objeto y aleje otra luz.',
+  'fault.patterns-blocked':
+    'El navegador ha bloqueado la ventana de patrones. Permita las ventanas emergentes para esta página y ábrala de nuevo.',
+  'fault.patterns-closed': 'La ventana de patrones está cerrada. Ábrala de nuevo.',
 };

@@ -111,4 +111,48 @@ export default {
   'singular.all':
     'Montrées pour tous les {width} × {height} éléments lumineux et les trois canaux.',
   'fault.code': 'Code : {code}',
+  'source.camera': 'Votre caméra et un second écran',
+  'camera.help':
+    'Placez un objet translucide tout près d’un second écran, par exemple du verre coloré ou une feuille, dirigez-y la caméra et faites le noir dans la pièce. La page affiche des motifs sur cet écran et photographie chacun d’eux ; rien n’est envoyé. La vidéo n’a que 8 bits et est traitée : les fichiers bruts d’un véritable appareil sont bien plus précis. Le SNR sur des images non utilisées dit ce que vaut le résultat.',
+  'camera.start': 'Démarrer la caméra',
+  'camera.window': 'Ouvrir la fenêtre des motifs',
+  'camera.window.help':
+    'Déplacez la fenêtre des motifs sur le second écran et cliquez dessus : elle le remplit alors. Son carré blanc doit presque remplir l’image ci-dessous, droit et vu de face.',
+  'camera.device': 'Caméra',
+  'camera.photograph': 'Photographier tous les motifs',
+  'camera.save': 'Enregistrer les photographies',
+  'job.photographing': 'Les motifs sont photographiés',
+  'camera.started': 'La caméra fonctionne.',
+  'camera.title': 'Photographié dans un navigateur',
+  'camera.window.title': 'Motifs',
+  'camera.window.opened': 'La fenêtre des motifs est ouverte.',
+  'camera.paused':
+    'En pause, car cet onglet ou la fenêtre des motifs est masqué ; les photographies reprennent quand les deux sont visibles.',
+  'camera.noise':
+    'Bruit d’une image : {noise} % de la pleine échelle. Chaque photographie est la moyenne d’au moins {frames} images.',
+  'camera.unlocked':
+    'Le navigateur n’a pas pu fixer ceci : {settings}. Si cela change entre-temps, le résultat est moins précis.',
+  'camera.exposure': 'exposition',
+  'camera.focus': 'mise au point',
+  'camera.whiteBalance': 'balance des blancs',
+  'camera.kept':
+    'Les photographies de {patterns} motifs sont gardées : calculez avec elles, ou photographiez de nouveau.',
+  'camera.done': '{photographs} photographies ont été prises.',
+  'fault.camera-unsupported':
+    'Ce navigateur ne donne pas de caméra à la page. Prenez un navigateur récent et ouvrez la page par https.',
+  'fault.camera-refused':
+    'La page n’a pas le droit d’utiliser la caméra. Autorisez-la dans les réglages du navigateur pour cette page, puis redémarrez la caméra.',
+  'fault.camera-missing': 'Aucune caméra n’a été trouvée. Branchez-en une et redémarrez-la.',
+  'fault.camera-busy':
+    'La caméra ne donne pas d’image. Fermez les autres programmes qui l’utilisent et redémarrez-la.',
+  'fault.camera-lost': 'La caméra a disparu. Rebranchez-la et redémarrez-la.',
+  'fault.camera-saturated':
+    'En pleine lumière, {percent} % de l’image est trop clair pour la caméra. Assombrissez le second écran ou prenez une autre caméra.',
+  'fault.camera-no-signal':
+    'L’image de la caméra ne change pas avec les motifs. Dirigez la caméra vers le second écran et gardez-y la fenêtre des motifs visible.',
+  'fault.camera-unstable':
+    'L’image de la caméra n’est jamais stable. Fixez la caméra et l’objet, et éliminez toute autre lumière.',
+  'fault.patterns-blocked':
+    'Le navigateur a bloqué la fenêtre des motifs. Autorisez les fenêtres surgissantes pour cette page et ouvrez-la de nouveau.',
+  'fault.patterns-closed': 'La fenêtre des motifs est fermée. Ouvrez-la de nouveau.',
 };

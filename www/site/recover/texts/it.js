@@ -111,4 +111,48 @@ export default {
   'singular.all':
     'Mostrati per tutti i {width} × {height} elementi luminosi e tutti e tre i canali.',
   'fault.code': 'Codice: {code}',
+  'source.camera': 'La vostra fotocamera e un secondo schermo',
+  'camera.help':
+    'Mettete qualcosa di traslucido vicino a un secondo schermo, per esempio vetro colorato o una foglia, puntate la fotocamera e oscurate la stanza. La pagina mostra motivi su quello schermo e fotografa ciascuno; nulla viene inviato. Il video ha 8 bit ed è elaborato: i file grezzi di una vera fotocamera sono molto più precisi. L’SNR su immagini non usate dice quanto vale il risultato.',
+  'camera.start': 'Avviare la fotocamera',
+  'camera.window': 'Aprire la finestra dei motivi',
+  'camera.window.help':
+    'Spostate la finestra dei motivi sul secondo schermo e fate clic: allora lo riempie. Il suo quadrato bianco deve quasi riempire l’immagine qui sotto, diritto e visto di fronte.',
+  'camera.device': 'Fotocamera',
+  'camera.photograph': 'Fotografare tutti i motivi',
+  'camera.save': 'Salvare le fotografie',
+  'job.photographing': 'I motivi vengono fotografati',
+  'camera.started': 'La fotocamera è attiva.',
+  'camera.title': 'Fotografato in un browser',
+  'camera.window.title': 'Motivi',
+  'camera.window.opened': 'La finestra dei motivi è aperta.',
+  'camera.paused':
+    'In pausa, perché questa scheda o la finestra dei motivi è nascosta; le fotografie proseguono quando entrambe sono visibili.',
+  'camera.noise':
+    'Rumore di un fotogramma: {noise} % del fondo scala. Ogni fotografia è la media di almeno {frames} fotogrammi.',
+  'camera.unlocked':
+    'Il browser non ha potuto fissare questo: {settings}. Se cambia nel frattempo, il risultato è meno preciso.',
+  'camera.exposure': 'esposizione',
+  'camera.focus': 'messa a fuoco',
+  'camera.whiteBalance': 'bilanciamento del bianco',
+  'camera.kept':
+    'Le fotografie di {patterns} motivi restano: usatele per la ricostruzione, o fotografate di nuovo.',
+  'camera.done': 'Sono state fatte {photographs} fotografie.',
+  'fault.camera-unsupported':
+    'Questo browser non dà una fotocamera alla pagina. Usate un browser aggiornato e aprite la pagina con https.',
+  'fault.camera-refused':
+    'La pagina non può usare la fotocamera. Permettetelo nelle impostazioni del browser per questa pagina e riavviate la fotocamera.',
+  'fault.camera-missing': 'Non è stata trovata nessuna fotocamera. Collegatene una e riavviatela.',
+  'fault.camera-busy':
+    'La fotocamera non dà immagini. Chiudete gli altri programmi che la usano e riavviatela.',
+  'fault.camera-lost': 'La fotocamera è scomparsa. Collegatela e riavviatela.',
+  'fault.camera-saturated':
+    'In piena luce il {percent} % dell’immagine è troppo chiaro per la fotocamera. Rendete più scuro il secondo schermo o usate un’altra fotocamera.',
+  'fault.camera-no-signal':
+    'L’immagine della fotocamera non cambia con i motivi. Puntate la fotocamera sul secondo schermo e tenetevi visibile la finestra dei motivi.',
+  'fault.camera-unstable':
+    'L’immagine della fotocamera non è mai ferma. Fissate fotocamera e oggetto e tenete lontana altra luce.',
+  'fault.patterns-blocked':
+    'Il browser ha bloccato la finestra dei motivi. Permettete le finestre popup per questa pagina e apritela di nuovo.',
+  'fault.patterns-closed': 'La finestra dei motivi è chiusa. Apritela di nuovo.',
 };

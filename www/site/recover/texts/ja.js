@@ -105,4 +105,48 @@ export default {
   'singular.block': '中央の {width} × {height} 光要素についての値です。',
   'singular.all': '{width} × {height} 光要素すべてと 3 チャンネルについての値です。',
   'fault.code': 'コード：{code}',
+  'source.camera': 'お使いのカメラと第二の画面',
+  'camera.help':
+    '色ガラスや葉など光を通すものを第二の画面のすぐ前に置き、カメラを向けて部屋を暗くします。ページはその画面にパターンを表示し、一つずつ撮影します。何も送信されません。動画は 8 ビットで加工されているため、本格的なカメラの RAW ファイルのほうがはるかに正確です。使わなかった画像での SNR が結果の良さを示します。',
+  'camera.start': 'カメラを開始',
+  'camera.window': 'パターンのウィンドウを開く',
+  'camera.window.help':
+    'パターンのウィンドウを第二の画面に移してクリックすると、全画面になります。白い正方形が下の映像のほぼ全体に、正面からまっすぐ写るようにします。',
+  'camera.device': 'カメラ',
+  'camera.photograph': 'すべてのパターンを撮影',
+  'camera.save': '写真を保存',
+  'job.photographing': 'パターンを撮影しています',
+  'camera.started': 'カメラが動作しています。',
+  'camera.title': 'ブラウザーで撮影',
+  'camera.window.title': 'パターン',
+  'camera.window.opened': 'パターンのウィンドウが開きました。',
+  'camera.paused':
+    'このタブかパターンのウィンドウが隠れているため、一時停止中です。両方が見えると撮影を続けます。',
+  'camera.noise':
+    '1 フレームのノイズは最大値の {noise} %。写真はそれぞれ {frames} フレーム以上の平均です。',
+  'camera.unlocked':
+    'ブラウザーは次の項目を固定できませんでした: {settings}。途中で変わると精度が下がります。',
+  'camera.exposure': '露出',
+  'camera.focus': 'ピント',
+  'camera.whiteBalance': 'ホワイトバランス',
+  'camera.kept':
+    '{patterns} 個のパターンの写真が残っています。これで復元するか、もう一度撮影してください。',
+  'camera.done': '{photographs} 枚を撮影しました。',
+  'fault.camera-unsupported':
+    'このブラウザーではカメラを使えません。新しいブラウザーを使い、ページを https で開いてください。',
+  'fault.camera-refused':
+    'このページはカメラを使えません。ブラウザーの設定でこのページに許可し、カメラをもう一度開始してください。',
+  'fault.camera-missing': 'カメラが見つかりません。接続して、もう一度開始してください。',
+  'fault.camera-busy':
+    'カメラから映像が来ません。使用中のほかのプログラムを閉じて、もう一度開始してください。',
+  'fault.camera-lost': 'カメラが失われました。接続して、もう一度開始してください。',
+  'fault.camera-saturated':
+    '最大の光で、画像の {percent} % がカメラには明るすぎます。第二の画面を暗くするか、別のカメラを使ってください。',
+  'fault.camera-no-signal':
+    'カメラの映像がパターンに合わせて変わりません。カメラを第二の画面に向け、そこでパターンのウィンドウが見えるようにしてください。',
+  'fault.camera-unstable':
+    'カメラの映像が静止しません。カメラと物体を固定し、ほかの光を遮ってください。',
+  'fault.patterns-blocked':
+    'ブラウザーがパターンのウィンドウをブロックしました。このページのポップアップを許可し、もう一度開いてください。',
+  'fault.patterns-closed': 'パターンのウィンドウが閉じられました。もう一度開いてください。',
 };
