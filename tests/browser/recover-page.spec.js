@@ -47,6 +47,14 @@ async function halves(page, id) {
   }, id);
 }
 
+/** Has the page take its tab for hidden. @param {Page} page @param {boolean} isHidden */
+async function hideTab(page, isHidden) {
+  await page.evaluate((isHidden) => {
+    Object.defineProperty(document, 'hidden', { configurable: true, get: () => isHidden });
+    document.dispatchEvent(new Event('visibilitychange'));
+  }, isHidden);
+}
+
 /** Copies the fixture's capture and changes it. @param {(folder: string) => void} change */
 function changedCapture(change) {
   const folder = join(mkdtempSync(join(tmpdir(), 'capture-')), 'glass');
@@ -138,6 +146,10 @@ test.describe('a simulated object', () => {
 
     await step('a change starts another recovery, which can be cancelled', async () => {
       await page.getByLabel('Method').first().selectOption('nnls');
+      await hideTab(page, true);
+      await expect(page.locator('#job-text')).toHaveText(/^The tab is hidden/);
+      await hideTab(page, false);
+      await expect(page.locator('#job-text')).toHaveText(/^(Reading|Learning|Recovering)/);
       await page.getByRole('button', { name: 'Cancel' }).click();
       await expect(announced).toHaveText('Cancelled.');
       await expect(page.locator('#cancel')).toBeHidden();
@@ -145,9 +157,19 @@ test.describe('a simulated object', () => {
       await recover(page, 10);
     });
 
+    await step('a recovery from each number of patterns adds its point, which stays', async () => {
+      await page.getByText('As a table').click();
+      const counts = page.locator('#snr-table td:first-child');
+      await expect(counts).toHaveText(['10', '40']);
+      await page.getByRole('button', { name: 'Recover from 5 to 160 patterns' }).click();
+      await expect(counts).toHaveText(['5', '10', '40'], { timeout: 100_000 });
+      await page.getByRole('button', { name: 'Cancel' }).click();
+      await expect(announced).toHaveText('Cancelled.');
+      await expect(counts).toHaveText(['5', '10', '40']);
+    });
+
     await step('the plot and its table have a line for each choice of settings', async () => {
       expect(await page.locator('#snr-plot polyline').count()).toBe(2);
-      await page.getByText('As a table').click();
       const heads = await page.locator('#snr-table th').allInnerTexts();
       expect(heads).toStrictEqual(['Patterns', 'Learned prior SNR', 'NNLS SNR']);
     });

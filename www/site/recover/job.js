@@ -26,13 +26,13 @@ export class Job {
   constructor() {
     this.#buttons.cancel.addEventListener('click', () => {
       this.cancel();
-      this.#tellEnd(t('job.cancelled'));
+      this.#tell(t('job.cancelled'));
     });
     document.addEventListener('visibilitychange', () => {
-      if (this.#running && document.hidden) this.#text.textContent = t('job.hidden');
+      if (this.#running && document.hidden) this.#tell(t('job.hidden'));
     });
     onLanguageChange(() => {
-      if (!this.#running) this.#tellEnd('');
+      if (!this.#running) this.#tell('');
     });
   }
 
@@ -77,7 +77,7 @@ export class Job {
           if (this.#running === controller) this.#report(key, share, secondsLeft);
         },
       });
-      if (this.#running === controller) this.#tellEnd(done);
+      if (this.#running === controller) this.#tell(done);
     } catch (error) {
       if (!controller.signal.aborted) {
         this.#text.textContent = '';
@@ -92,8 +92,8 @@ export class Job {
     }
   }
 
-  /** Shows how a job ended until the next. @param {string} message */
-  #tellEnd(message) {
+  /** @param {string} message for eyes and screen readers */
+  #tell(message) {
     this.#text.textContent = message;
     this.announce(message);
   }
@@ -122,6 +122,8 @@ export class Job {
   /** @type {ReportStage} */
   #report(key, share, secondsLeft) {
     this.#bar.value = share;
+    // What the page says of hidden tabs stays.
+    if (document.hidden) return;
     const left =
       secondsLeft === undefined ? [] : [t('job.left', { seconds: Math.ceil(secondsLeft) })];
     const message = [t(key), ...left].join(' · ');

@@ -58,10 +58,11 @@ export function drawPlot(container, { label, x, y, series }) {
   container.replaceChildren(svg);
 }
 
-/** Round values from 0 to at least `max`, at most seven. @param {number} max */
-export function roundTicks(max) {
-  const step = [1, 2, 5, 10, 20, 50].find((step) => max / step <= 6) ?? 100;
-  return Array.from({ length: Math.ceil(max / step) + 1 }, (_, i) => i * step);
+/** Round values from at most `min` to at least `max`, at most eight. @param {number} min @param {number} max */
+export function roundTicks(min, max) {
+  const step = [1, 2, 5, 10, 20, 50].find((step) => (max - min) / step <= 6) ?? 100;
+  const first = Math.floor(min / step);
+  return Array.from({ length: Math.ceil(max / step) - first + 1 }, (_, i) => (first + i) * step);
 }
 
 /** @param {string} name @param {Record<string, string | number>} attributes */

@@ -8,22 +8,24 @@ const CODES = Uint8ClampedArray.from({ length: 4096 }, (_, i) => {
   return 255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055);
 });
 
+/** Of red, green and blue, in `drawHeat`. */
+const HEAT_GAINS = [2.2, 1.35, 1];
+
 /** @param {number} linear */
 const code = (linear) => CODES[Math.max(0, Math.min(4095, Math.round(4095 * linear)))] ?? 0;
 
 /** Draws linear RGB, `[N, 3]`; `white` is the value that becomes white. @param {HTMLCanvasElement} canvas @param {Size} size @param {Float32Array} values @param {number} white */
 export function drawPicture(canvas, size, values, white) {
-  draw(canvas, size, (n) => {
-    const first = 3 * n;
-    return [0, 1, 2].map((c) => code((values[first + c] ?? 0) / white));
+  draw(canvas, size, (n, data) => {
+    for (let c = 0; c < 3; c += 1) data[4 * n + c] = code((values[3 * n + c] ?? 0) / white);
   });
 }
 
 /** Draws values from 0, black, over red and orange to `white`. @param {HTMLCanvasElement} canvas @param {Size} size @param {ArrayLike<number>} values @param {number} white */
 export function drawHeat(canvas, size, values, white) {
-  draw(canvas, size, (n) => {
+  draw(canvas, size, (n, data) => {
     const heat = Math.max(0, Math.min(1, (values[n] ?? 0) / white));
-    return [2.2, 1.35, 1].map((gain, c) => 255 * Math.max(0, Math.min(1, gain * heat ** (1 + c))));
+    for (const [c, gain] of HEAT_GAINS.entries()) data[4 * n + c] = 255 * gain * heat ** (1 + c);
   });
 }
 
@@ -54,13 +56,13 @@ export function largest(values) {
   return peak || 1;
 }
 
-/** @param {HTMLCanvasElement} canvas @param {Size} size @param {(n: number) => number[]} colour */
-function draw(canvas, { width, height }, colour) {
+/** `drawPixel` writes the colour of a pixel. @param {HTMLCanvasElement} canvas @param {Size} size @param {(n: number, data: Uint8ClampedArray) => void} drawPixel */
+function draw(canvas, { width, height }, drawPixel) {
   if (canvas.width !== width) canvas.width = width;
   if (canvas.height !== height) canvas.height = height;
   const image = new ImageData(width, height);
   for (let n = 0; n < width * height; n += 1) {
-    image.data.set(colour(n), 4 * n);
+    drawPixel(n, image.data);
     image.data[4 * n + 3] = 255;
   }
   canvas.getContext('2d')?.putImageData(image, 0, 0);

@@ -43,8 +43,9 @@ export class SnrPlot {
       hasMarkers: true,
     }));
     const all = series.flatMap(({ points }) => points);
+    const values = all.map(({ y }) => y);
     // Room above the highest point.
-    const ticks = roundTicks(Math.max(10, ...all.map(({ y }) => y + 1)));
+    const ticks = roundTicks(Math.min(0, ...values), Math.max(10, ...values.map((y) => y + 1)));
     const points = series.at(-1)?.points ?? [];
     const described = points.map(({ x, y }) =>
       t('snr.point', { patterns: x, snr: formatNumber(y, 1) }),
@@ -63,7 +64,7 @@ export class SnrPlot {
         format: (value) => formatNumber(value),
       },
       y: {
-        min: 0,
+        min: ticks[0] ?? 0,
         max: ticks.at(-1) ?? 10,
         ticks,
         label: t('snr.axis'),
