@@ -70,6 +70,15 @@ if [ -z "${CC_wasm32_unknown_unknown:-}" ] || [ -z "${AR_wasm32_unknown_unknown:
 fi
 export CC_wasm32_unknown_unknown AR_wasm32_unknown_unknown
 
+# The modules compress at levels 1 and 19, whose strategies are fast and btultra2: zstd leaves out the others. A level
+# with another strategy would write other bytes than the command line.
+if [[ ${CFLAGS_wasm32_unknown_unknown:-} != *ZSTD_EXCLUDE_* ]]; then
+  for strategy in DFAST GREEDY LAZY LAZY2 BTLAZY2 BTOPT; do
+    CFLAGS_wasm32_unknown_unknown+=" -DZSTD_EXCLUDE_${strategy}_BLOCK_COMPRESSOR"
+  done
+fi
+export CFLAGS_wasm32_unknown_unknown
+
 CHROMIUM=${CHROMIUM:-$(first_command chromium chromium-browser google-chrome google-chrome-stable)}
 HEADLESS_SHELL=${HEADLESS_SHELL:-$(first_command chromium-headless-shell chrome-headless-shell)}
 CHROMEDRIVER=${CHROMEDRIVER:-$(first_command chromedriver chromium.chromedriver)}

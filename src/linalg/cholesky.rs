@@ -12,7 +12,7 @@ const SAFE_PRODUCT: f64 = 1e150;
 
 /// Replaces `A` by `U`. Returns the logarithm of A's determinant, or `None` if A is not positive definite to working
 /// precision.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
     let (mut log_det, mut determinant) = (0.0, 1.0);
     for first in (0..n).step_by(BLOCK) {
@@ -70,7 +70,7 @@ pub(crate) fn cholesky_with_ridge(a: &[f64], n: usize, ridge: f64) -> Option<(Ve
 }
 
 /// Replaces `b`, `[n]`, by the solution of `UᵀUx = b`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn cholesky_solve(u: &[f64], b: &mut [f64]) {
     let n = b.len();
     for k in 0..n {
@@ -85,7 +85,7 @@ pub(crate) fn cholesky_solve(u: &[f64], b: &mut [f64]) {
 }
 
 /// Writes the upper triangle of `(UᵀU)⁻¹` into `inverse`; `scratch` is `[n, n]` too.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn cholesky_inverse(u: &[f64], n: usize, scratch: &mut [f64], inverse: &mut [f64]) {
     // W = U⁻¹ from the last row up, then WWᵀ.
     for k in (0..n).rev() {

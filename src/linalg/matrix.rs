@@ -3,7 +3,7 @@
 use super::vector::{add_scaled, dot};
 
 /// Writes `Ax` into `y`, for a square `A` `[n, n]`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn multiply_vector(a: &[f64], x: &[f64], y: &mut [f64]) {
     let n = x.len();
     for (y, row) in y.iter_mut().zip(a.chunks_exact(n)) {

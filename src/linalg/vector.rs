@@ -4,18 +4,18 @@
 pub(crate) const LANES: usize = 8;
 
 /// Returns `n` rounded up to a multiple of [`LANES`].
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn padded_len(n: usize) -> usize {
     n.next_multiple_of(LANES)
 }
 
 /// Returns `aᵀb` for vectors whose length is a multiple of [`LANES`].
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn dot_padded(a: &[f64], b: &[f64]) -> f64 {
     dot_lanes(a.as_chunks().0, b.as_chunks().0)
 }
 
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn dot_lanes(a: &[[f64; LANES]], b: &[[f64; LANES]]) -> f64 {
     let mut lanes = [0.0f64; LANES];
     for (a, b) in a.iter().zip(b) {
@@ -28,7 +28,7 @@ fn dot_lanes(a: &[[f64; LANES]], b: &[[f64; LANES]]) -> f64 {
 }
 
 /// Computes `y += factor · x` for vectors whose length is a multiple of [`LANES`].
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn add_scaled_padded(y: &mut [f64], factor: f64, x: &[f64]) {
     let y = y.as_chunks_mut::<LANES>().0;
     for (y, x) in y.iter_mut().zip(x.as_chunks::<LANES>().0) {
@@ -41,7 +41,7 @@ pub(crate) fn add_scaled_padded(y: &mut [f64], factor: f64, x: &[f64]) {
 }
 
 /// Returns `aᵀb` for vectors of one length.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a_lanes, a_rest), (b_lanes, b_rest)) = (a.as_chunks(), b.as_chunks());
     let mut rest = 0.0;
@@ -52,7 +52,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Computes `y += factor · x`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn add_scaled(y: &mut [f64], factor: f64, x: &[f64]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y += factor * x;
@@ -60,7 +60,7 @@ pub(crate) fn add_scaled(y: &mut [f64], factor: f64, x: &[f64]) {
 }
 
 /// Computes `y += Σ_i factors[i] · matrix[rows[i]]`, for a `[_, k]` matrix and `y` `[k]`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn add_scaled_rows(y: &mut [f64], matrix: &[f64], rows: &[usize], factors: &[f64]) {
     let k = y.len();
     let row = |m: usize| &matrix[m * k..(m + 1) * k];

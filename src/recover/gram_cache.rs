@@ -51,7 +51,7 @@ impl WindowEquations {
     /// `(WP̂)ᵀ Wy` for weighted measurements `Wy`, `[k]`.
     pub fn right_hand_side(&self, weighted_y: &[f64]) -> Vec<f64> {
         vectorise(
-            #[inline(always)]
+            #[cfg_attr(target_arch = "x86_64", inline(always))]
             || self.columns.right_hand_side(weighted_y).collect(),
         )
     }
@@ -111,7 +111,7 @@ impl GramCache {
         let products = origins.len() * window.area().pow(2);
         if entries * size_of::<f64>() <= MAX_TABLE_BYTES && entries < products {
             cache.correlations = vectorise(
-                #[inline(always)]
+                #[cfg_attr(target_arch = "x86_64", inline(always))]
                 || cache.correlate(),
             );
         }
@@ -119,13 +119,13 @@ impl GramCache {
     }
 
     /// Weighted emissions of the region's element `m`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn emission(&self, m: usize) -> &[f64] {
         let patterns = self.weights.len();
         &self.emissions[m * patterns..(m + 1) * patterns]
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn correlate(&self) -> Vec<f64> {
         let window = self.geometry.window;
         let (width, height) = (self.region.columns.len(), self.region.rows.len());
@@ -180,7 +180,7 @@ impl GramCache {
             }
         }
         let (columns, gram) = vectorise(
-            #[inline(always)]
+            #[cfg_attr(target_arch = "x86_64", inline(always))]
             || {
                 let weights = EquationWeights::new(weights, common_mode);
                 let weighted = WeightedColumns::from_weighted(emissions, weights);
@@ -199,7 +199,7 @@ impl GramCache {
     }
 
     /// The Gram matrix of `elements`, which are in rows of `width`, from the table.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn look_up(
         &self,
         columns: &WeightedColumns,
@@ -237,7 +237,7 @@ fn offsets(window: Window) -> usize {
 }
 
 /// Computes `A −= factor · vvᵀ`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn subtract_outer_product(a: &mut [f64], factor: f64, v: &[f64]) {
     for (row, x) in a.chunks_exact_mut(v.len().max(1)).zip(v) {
         let scaled = factor * x;

@@ -92,7 +92,7 @@ fn fit_round(
                     continue;
                 }
                 vectorise(
-                    #[inline(always)]
+                    #[cfg_attr(target_arch = "x86_64", inline(always))]
                     || add_window(&mut sums, preparation, mean, origin, &pixels),
                 );
             }
@@ -105,7 +105,7 @@ fn fit_round(
     Nnls::new(&gram, area).solve(&right)
 }
 
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn add_window(
     sums: &mut NormalEquations,
     preparation: &RecoveryPreparationInput<impl Executor>,
@@ -149,7 +149,7 @@ pub(super) struct PooledMeasurements {
 impl PooledMeasurements {
     /// Sums over the channels of the pixels that are nowhere saturated. `level` is the mean over the patterns that a
     /// pixel of brightness 1 measures.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn new(
         measurements: &Measurements,
         pattern_indices: &[usize],

@@ -51,13 +51,13 @@ impl<'a> Nnls<'a> {
     /// to the precision of the Gram matrix, stays zero whatever its gradient.
     pub fn solve(&mut self, h: &[f64]) -> Vec<f64> {
         vectorise(
-            #[inline(always)]
+            #[cfg_attr(target_arch = "x86_64", inline(always))]
             || self.search(h),
         );
         self.passive.scatter(&self.x)
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn search(&mut self, h: &[f64]) {
         self.passive.clear();
         self.x.clear();
@@ -112,7 +112,7 @@ impl<'a> Nnls<'a> {
 
     /// Moves x, which is feasible, to the least-squares solution on the passive set. Members that would become negative
     /// leave the set.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn move_to_solution(&mut self) {
         loop {
             let solution = self.passive.solution(0);
@@ -147,7 +147,7 @@ impl<'a> Nnls<'a> {
 
     /// Removes the rounding error of the solution: next to nothing in `x`, but all of the residual if the measurements
     /// can be met exactly.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn refine_solution(&mut self) {
         self.passive.refine(0, &self.gradient);
         if self.passive.solution(0).iter().all(|&z| z > 0.0) {
@@ -157,7 +157,7 @@ impl<'a> Nnls<'a> {
 
     /// Inserts the members into an empty set, one by one, which removes the rounding errors of many updates from the
     /// inverse.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn rebuild(&mut self, h: &[f64]) {
         let members = self.passive.members().to_vec();
         let x = std::mem::take(&mut self.x);
@@ -171,7 +171,7 @@ impl<'a> Nnls<'a> {
     }
 
     /// Computes the gradient. Returns its largest magnitude on the passive set, where it should be zero.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn update_gradient(&mut self, h: &[f64]) -> f64 {
         self.gradient.copy_from_slice(h);
         self.passive.subtract_product(&mut self.gradient, &self.x);
@@ -181,7 +181,7 @@ impl<'a> Nnls<'a> {
 
     /// Unknowns outside the passive set with large gradients, and these gradients, in descending order. In each class
     /// of indices modulo [`LANES`], the unknown with the largest gradient.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn largest_gradients(&mut self, refused: &[usize]) -> [(usize, f64); LANES] {
         self.entering[..self.k].copy_from_slice(&self.gradient);
         for &j in self.passive.members().iter().chain(refused) {

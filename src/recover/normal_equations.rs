@@ -36,14 +36,14 @@ impl EquationWeights {
     }
 
     /// Replaces `v`, `[L]`, by `Wv`. Returns the mean of v, with `w²` as weights.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn apply(&self, v: &mut [f64]) -> f64 {
         v.iter_mut().zip(&self.patterns).for_each(|(v, w)| *v *= w);
         self.weight_common_mode(v)
     }
 
     /// Replaces `diag(w)v` by `Wv`. Returns the mean of v, with `w²` as weights.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn weight_common_mode(&self, v: &mut [f64]) -> f64 {
         let mean = dot(&self.patterns, v) / self.energy;
         let excess = (1.0 - self.common_mode.weight()) * mean;
@@ -64,7 +64,7 @@ pub(super) struct WeightedColumns {
 
 impl WeightedColumns {
     /// Applies W to `Aᵀ`, `[k, L]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn new(mut columns: Vec<f64>, weights: EquationWeights) -> Self {
         for column in columns.chunks_exact_mut(weights.len().max(1)) {
             let column = column.iter_mut().zip(&weights.patterns);
@@ -74,7 +74,7 @@ impl WeightedColumns {
     }
 
     /// Applies W to `Aᵀ diag(w)`, `[k, L]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn from_weighted(mut columns: Vec<f64>, weights: EquationWeights) -> Self {
         let means = columns.chunks_exact_mut(weights.len().max(1));
         let means = means.map(|column| weights.weight_common_mode(column));
@@ -93,14 +93,14 @@ impl WeightedColumns {
         self.columns.chunks_exact(self.weights.len().max(1))
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn column(&self, unknown: usize) -> &[f64] {
         let patterns = self.weights.len();
         &self.columns[unknown * patterns..(unknown + 1) * patterns]
     }
 
     /// `(WA)ᵀ(WA)`, `[k, k]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn gram(&self) -> Vec<f64> {
         let k = self.unknowns();
         let mut gram = vec![0.0; k * k];
@@ -115,13 +115,13 @@ impl WeightedColumns {
     }
 
     /// `(WA)ᵀ Wy` for weighted measurements `Wy`, `[k]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn right_hand_side(&self, weighted_y: &[f64]) -> impl Iterator<Item = f64> {
         self.iter().map(move |column| dot(column, weighted_y))
     }
 
     /// `Wy − WAx` for weighted measurements `Wy`, `[L]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn residual(&self, weighted_y: &[f64], x: &[f64]) -> Vec<f64> {
         let mut residual = weighted_y.to_vec();
         for (column, &x) in self.iter().zip(x).filter(|(_, x)| **x != 0.0) {
@@ -155,7 +155,7 @@ impl NormalEquations {
     }
 
     /// Adds `factor · (WA)ᵀ(WA)` and `(WA)ᵀ Wy`. Column i of A belongs to unknown `unknowns[i]`; these rise.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn add(
         &mut self,
         columns: &WeightedColumns,

@@ -61,31 +61,31 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn members(&self) -> &[usize] {
         &self.members
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn contains(&self, j: usize) -> bool {
         self.is_member[j]
     }
 
     /// An unknown's row of the Gram matrix.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn row(&self, j: usize) -> &'a [f64] {
         let k = self.is_member.len();
         &self.gram[j * k..(j + 1) * k]
     }
 
     /// Computes `y += Gx`, `[k]`, for the values `x` of the members.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn add_product(&self, y: &mut [f64], x: &[f64]) {
         add_scaled_rows(y, self.gram, &self.members, x);
     }
 
     /// Computes `y −= Gx`, `[k]`, for the values `x` of the members.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn subtract_product(&self, y: &mut [f64], x: &[f64]) {
         let negated: Vec<f64> = x.iter().map(|x| -x).collect();
         self.add_product(y, &negated);
@@ -100,7 +100,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         all
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn clear(&mut self) {
         let width = self.padded_len();
         for panel in panels(&mut self.inverse, self.stride, width) {
@@ -115,19 +115,19 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 
     /// Padded length of vectors over the set.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn padded_len(&self) -> usize {
         padded_len(self.members.len())
     }
 
     /// The solution of `G[P, P] z = b[P]` for right-hand side `which`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn solution(&self, which: usize) -> &[f64] {
         &self.solutions[which][..self.members.len()]
     }
 
     /// Replaces right-hand side `which` by `b`, `[k]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn set_rhs(&mut self, which: usize, b: &[f64]) {
         self.gather(b);
         self.multiply_by_inverse();
@@ -136,7 +136,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 
     /// Corrects the solution z of right-hand side `which` by its residual `b − Gz`, `[k]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn refine(&mut self, which: usize, residual: &[f64]) {
         self.gather(residual);
         self.multiply_by_inverse();
@@ -146,7 +146,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 
     /// Sets `column = b[P]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn gather(&mut self, b: &[f64]) {
         let n = self.members.len();
         let width = self.padded_len();
@@ -157,7 +157,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 
     /// Sets `product = H · column`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn multiply_by_inverse(&mut self) {
         let width = self.padded_len();
         // H is symmetric: its rows are its columns, so the sums need no reduction across a register.
@@ -176,7 +176,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 
     /// Evaluates unknown `j`, with its entries `b` of the right-hand sides, as a candidate for the set.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn evaluate(&mut self, j: usize, b: [f64; N]) -> EnteringUnknown<N> {
         let row = self.row(j);
         self.gather(row);
@@ -194,14 +194,14 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
 
     /// Inserts unknown `j`, with its entries `b` of the right-hand sides. Returns false if its column depends linearly
     /// on those of the set.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn evaluate_and_insert(&mut self, j: usize, b: [f64; N]) -> bool {
         let candidate = self.evaluate(j, b);
         self.insert(candidate)
     }
 
     /// Inserts the candidate that was evaluated last. Returns false if its column depends linearly on those of the set.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn insert(&mut self, candidate: EnteringUnknown<N>) -> bool {
         self.multiply_by_inverse();
         let (n, before) = (self.members.len(), self.padded_len());
@@ -230,7 +230,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 
     /// Computes `H += factor · product productᵀ`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn add_outer_product(&mut self, factor: f64) {
         let width = self.padded_len();
         let product = &self.product[..width];
@@ -252,7 +252,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 
     /// Removes the member at position `i`; the last member moves there.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn remove(&mut self, i: usize) {
         let (last, width) = (self.members.len() - 1, self.padded_len());
         // The column of H that is removed.
@@ -273,7 +273,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     }
 
     /// Moves the last row and column of H to position `i`, and fills them with zeros.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn move_last_to(&mut self, i: usize) {
         let (last, width, stride) = (self.members.len() - 1, self.padded_len(), self.stride);
         for panel in panels(&mut self.inverse, stride, width) {
@@ -318,7 +318,7 @@ pub(super) struct EnteringUnknown<const N: usize> {
 }
 
 /// The panels of the first `width` columns of `H`, `width` rows each.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn panels(
     inverse: &mut [RegisterBlock],
     stride: usize,

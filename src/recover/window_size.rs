@@ -92,7 +92,7 @@ impl WindowSizeEstimate {
             for square in &squares[start(part)..start(part + 1)] {
                 for (origin, pixels) in sampling::pixels_by_window(&geometry, *square) {
                     vectorise(
-                        #[inline(always)]
+                        #[cfg_attr(target_arch = "x86_64", inline(always))]
                         || rings.add_window(&mut sums, measurements, &geometry, origin, &pixels),
                     );
                 }
@@ -158,7 +158,7 @@ impl WindowRings {
     }
 
     /// Adds the equations of one window's pixels, for the flux of each ring.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn add_window(
         &self,
         sums: &mut NormalEquations,
@@ -213,7 +213,7 @@ impl WindowRings {
 
 /// Replaces `columns` by their projection onto the complement of `others`. Returns false if the others depend on each
 /// other linearly.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn project_out(columns: &mut WeightedColumns, others: &WeightedColumns) -> bool {
     let mut gram = others.gram();
     if linalg::cholesky(&mut gram, others.unknowns()).is_none() {

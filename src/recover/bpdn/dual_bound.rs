@@ -43,7 +43,7 @@ impl BpdnSolution {
 
     /// Replaces the solution by a feasible point near x, if that is better, and the bound by the one that
     /// multipliers s near the optimal ones prove, if that is higher.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub(super) fn record(
         &mut self,
         operator: &SensingOperator,
@@ -66,7 +66,7 @@ impl BpdnSolution {
 
 /// Points near `x` that satisfy the constraint: the darkest multiple of x that does, and the nearest
 /// point on the line to the least-squares solution.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn feasible_points(
     operator: &SensingOperator,
     constraint: &BpdnConstraint,
@@ -88,7 +88,7 @@ fn feasible_points(
 }
 
 /// The least `t ≥ 0` at which `‖residual + t change‖ ≤ ε`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn first_feasible(residual: &[f64], change: &[f64], epsilon: f64) -> Option<f64> {
     let (a, b) = (dot(change, change), -dot(change, residual));
     let c = dot(residual, residual) - epsilon * epsilon;
@@ -100,7 +100,7 @@ fn first_feasible(residual: &[f64], change: &[f64], epsilon: f64) -> Option<f64>
 }
 
 /// A lower bound on the objective, from multipliers s within ±1 and the direction of ν.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn dual_bound(
     operator: &SensingOperator,
     constraint: &BpdnConstraint,
@@ -122,7 +122,7 @@ fn dual_bound(
 ///
 /// With p = Aᵀν, q = φs and c = 1/side, the value of φ times the constant basis vector's unit coefficient,
 /// (tν, αs plus 1 − α of that vector) is dual feasible.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn max_scale(pairs: &[(f64, f64)], c: f64) -> f64 {
     // The feasible scales at α; a negative right-hand side with p < 0 makes a lower limit.
     let max_scale_at = |alpha: f64| {

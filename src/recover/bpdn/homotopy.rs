@@ -63,14 +63,14 @@ impl<'a> Homotopy<'a> {
     /// the constraint or nothing does, where it is the non-negative least-squares solution.
     pub fn solve(&mut self, h: &[f64], energy: f64, epsilon: f64) -> Vec<f64> {
         vectorise(
-            #[inline(always)]
+            #[cfg_attr(target_arch = "x86_64", inline(always))]
             || self.follow_path(h, energy, epsilon * epsilon),
         );
         self.passive.scatter(&self.x)
     }
 
     /// Follows the path to where ‖y − Ax‖² = `max_squared_residual`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn follow_path(&mut self, h: &[f64], energy: f64, max_squared_residual: f64) {
         self.passive.clear();
         self.x.clear();
@@ -114,7 +114,7 @@ impl<'a> Homotopy<'a> {
     }
 
     /// Adds an element to P unless its column depends linearly on those there.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn insert(&mut self, j: usize) {
         match self.passive.evaluate_and_insert(j, [0.0, 1.0]) {
             true => self.x.push(0.0),
@@ -123,14 +123,14 @@ impl<'a> Homotopy<'a> {
     }
 
     /// `‖y‖² − ‖y − Ax‖²` on the path, where `h − Gx = λ` on P.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn explained(&self, h: &[f64], lambda: f64) -> f64 {
         let terms = self.passive.members().iter().zip(&self.x);
         terms.map(|(&j, &x)| (h[j] + lambda) * x).sum()
     }
 
     /// How far λ falls to the end of the segment, and that end. `excess` is the squared residual minus its limit.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn next_event(&self, lambda: f64, excess: f64) -> (f64, HomotopyBreakpoint) {
         // With s = 1ᵀG[P, P]⁻¹1 the squared residual falls by 2γλs − γ²s over a step γ.
         let direction = self.passive.solution(ONES);
@@ -160,7 +160,7 @@ impl<'a> Homotopy<'a> {
 
     /// Removes the rounding error that x has gathered over the steps, by iterative refinement of
     /// `G[P, P] x = h[P] − λ`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn refine(&mut self, h: &[f64], lambda: f64) {
         for _ in 0..2 {
             for (c, h) in self.correlation.iter_mut().zip(h) {

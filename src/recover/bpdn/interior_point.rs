@@ -44,7 +44,7 @@ pub(in crate::recover) fn solve(
     let residual = operator.residual(constraint.least_squares, constraint.y);
     if !zero_is_feasible && dot(&residual, &residual).sqrt() < constraint.epsilon {
         vectorise(
-            #[inline(always)]
+            #[cfg_attr(target_arch = "x86_64", inline(always))]
             || iterate(operator, constraint, &mut best),
         );
     }
@@ -52,7 +52,7 @@ pub(in crate::recover) fn solve(
 }
 
 /// Improves `best`, which is feasible, until its gap is small enough or a step fails.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn iterate(operator: &SensingOperator, constraint: &BpdnConstraint, best: &mut BpdnSolution) {
     let Some(mut point) = Iterate::new(operator, constraint) else {
         return;

@@ -33,7 +33,7 @@ pub(super) struct Iterate {
 pub(super) type NewtonStep = Iterate;
 
 /// `½(ε² − ‖residual‖²)`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn slack(constraint: &BpdnConstraint, residual: &[f64]) -> f64 {
     let norm = dot(residual, residual).sqrt();
     0.5 * (constraint.epsilon - norm) * (constraint.epsilon + norm)
@@ -41,7 +41,7 @@ fn slack(constraint: &BpdnConstraint, residual: &[f64]) -> f64 {
 
 impl Iterate {
     /// A strictly feasible iterate: the least-squares solution plus a constant; `None` if there is none.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn new(operator: &SensingOperator, constraint: &BpdnConstraint) -> Option<Self> {
         let least_squares = constraint.least_squares;
         let max_slack = slack(constraint, &operator.residual(least_squares, constraint.y));
@@ -84,7 +84,7 @@ impl Iterate {
     }
 
     /// The sum of all products of slacks and multipliers.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn complementarity(&self) -> f64 {
         // ½(1 + s)(t − c) + ½(1 − s)(t + c) = t − sc
         let bounds = self.t.iter().sum::<f64>() - dot(&self.s, &self.coefficients);
@@ -92,7 +92,7 @@ impl Iterate {
     }
 
     /// t, s and c for each coefficient.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn bounds(&self) -> impl Iterator<Item = [f64; 3]> {
         let values = self.t.iter().zip(&self.s).zip(&self.coefficients);
         values.map(|((t, s), c)| [*t, *s, *c])
@@ -105,7 +105,7 @@ impl Iterate {
 
     /// The largest shares of a step, up to one, that keep the constraints: of the unknowns' part and of the
     /// multipliers'.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn max_step_lengths(&self, step: &NewtonStep) -> (f64, f64) {
         let limit = |value: f64, change: f64| match change < 0.0 {
             true => -value / change,
@@ -130,7 +130,7 @@ impl Iterate {
     }
 
     /// [`complementarity`](Self::complementarity) after these shares of a step.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn complementarity_after(&self, step: &NewtonStep, (primal, dual): (f64, f64)) -> f64 {
         let mut sum = 0.0;
         for ([t, s, c], [dt, ds, dc]) in self.bounds().zip(step.bounds()) {
@@ -146,7 +146,7 @@ impl Iterate {
     }
 
     /// Goes along a step, nearly as far as the constraints allow.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn take_step(
         &mut self,
         operator: &SensingOperator,

@@ -40,7 +40,7 @@ struct ComplementarityChange {
 
 impl<'a> NewtonSystem<'a> {
     /// Factors H; `None` if it is singular to rounding.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn new(operator: &'a SensingOperator, point: &'a Iterate) -> Option<Self> {
         let k = operator.unknowns();
         let correlation = operator.correlate(&point.residual);
@@ -77,7 +77,7 @@ impl<'a> NewtonSystem<'a> {
 
     /// Mehrotra's step. The predictor aims at products of zero; how much it lowers the complementarity
     /// determines μ. The corrector aims at products of μ and corrects for the predictor's second-order terms.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn predictor_corrector_step(&self) -> NewtonStep {
         let point = self.point;
         let upper = |[t, s, c]: [f64; 3]| -0.5 * (1.0 + s) * (t - c);
@@ -106,7 +106,7 @@ impl<'a> NewtonSystem<'a> {
     }
 
     /// The step that, to first order, changes the products by `change` and makes the dual residual zero.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn newton_step(&self, change: &ComplementarityChange) -> NewtonStep {
         let point = self.point;
         // ds for dx = 0.

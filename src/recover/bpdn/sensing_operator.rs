@@ -52,13 +52,13 @@ impl<'a> SensingOperator<'a> {
     }
 
     /// `‖φᵀx‖₁`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn objective(&self, x: &[f64]) -> f64 {
         self.coefficients(x).iter().map(|c| c.abs()).sum()
     }
 
     /// `φᵀx`, `[side²]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn coefficients(&self, x: &[f64]) -> Vec<f64> {
         let mut window = vec![0.0; self.side * self.side];
         for (&slot, &x) in self.equations.slots.iter().zip(x) {
@@ -68,7 +68,7 @@ impl<'a> SensingOperator<'a> {
     }
 
     /// φs, `[k]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn synthesize(&self, s: &[f64]) -> Vec<f64> {
         let window = self.transform(&self.synthesis, s);
         let slots = self.equations.slots.iter();
@@ -76,7 +76,7 @@ impl<'a> SensingOperator<'a> {
     }
 
     /// `M X Mᵀ` for a matrix M along one axis and X = `input`, all `[side, side]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn transform(&self, matrix: &[f64], input: &[f64]) -> Vec<f64> {
         let side = self.side;
         let half = linalg::multiply(matrix, input, side, side);
@@ -86,19 +86,19 @@ impl<'a> SensingOperator<'a> {
     }
 
     /// `y − Ax`, `[L]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn residual(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         self.equations.columns.residual(y, x)
     }
 
     /// `Aᵀr`, `[k]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn correlate(&self, r: &[f64]) -> Vec<f64> {
         self.equations.columns.right_hand_side(r).collect()
     }
 
     /// The upper triangle of `φ diag(d) φᵀ` on the unknowns, `[k, k]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn weighted_gram(&self, d: &[f64]) -> Vec<f64> {
         let (side, k, slots) = (self.side, self.unknowns(), &self.equations.slots);
         let pairs = self.products.len() / side;

@@ -80,7 +80,7 @@ impl LearnedBasis {
                 emission.copy_from_slice(&pattern[first..first + columns.len()]);
             }
             vectorise(
-                #[inline(always)]
+                #[cfg_attr(target_arch = "x86_64", inline(always))]
                 || multiply(&emission, &functions, responses),
             );
         }
@@ -118,7 +118,7 @@ impl PatternResponses {
 }
 
 /// `row = emission · functions`, `functions` `[element, stride]`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn multiply(emission: &[f32], functions: &[f32], row: &mut [f32]) {
     let stride = row.len();
     let mut at = 0;
@@ -133,7 +133,7 @@ fn multiply(emission: &[f32], functions: &[f32], row: &mut [f32]) {
 }
 
 /// Entries `at..at + WIDTH` of `row`; returns `WIDTH`.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 fn multiply_block<const WIDTH: usize>(
     emission: &[f32],
     functions: &[f32],

@@ -98,7 +98,7 @@ impl ObservationEquations {
                 let responses = basis.respond(measurements, geometry, origin, plane);
                 let window = (&responses, &pixels[..], channels);
                 vectorise(
-                    #[inline(always)]
+                    #[cfg_attr(target_arch = "x86_64", inline(always))]
                     || equations.add_window(measurements, geometry, pattern_indices, window),
                 );
             }
@@ -142,7 +142,7 @@ impl ObservationEquations {
     }
 
     /// Adds the observations of a window's pixels in the channels that one plane of the patterns drives.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn add_window(
         &mut self,
         measurements: &Measurements,
@@ -217,7 +217,7 @@ struct WeightedBasisResponses {
 }
 
 impl WeightedBasisResponses {
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn new(
         measurements: &Measurements,
         responses: &PatternResponses,
@@ -243,7 +243,7 @@ impl WeightedBasisResponses {
     }
 
     /// Brightness, variance, energy and count of channel `c` with measurements y; writes Bᵀy to `right_hand_side`, `[r]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn observe(
         &self,
         measurements: &Measurements,

@@ -72,7 +72,7 @@ impl LearnedModel {
         let rank = self.basis.rank();
         let mut coefficients = vec![[0.0f32; CHANNELS]; rect.extent.area() * rank];
         vectorise(
-            #[inline(always)]
+            #[cfg_attr(target_arch = "x86_64", inline(always))]
             || {
                 let mut solver = PosteriorSolver::new(rank);
                 for (i, location) in means.interior_locations().enumerate() {
@@ -92,7 +92,7 @@ impl LearnedModel {
     }
 
     /// ẑ of one observation, `[r]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn estimate(
         &self,
         means: &PosteriorMeans<'_>,

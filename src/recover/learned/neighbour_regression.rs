@@ -30,7 +30,7 @@ impl RegressionSums {
     }
 
     /// Adds an observation whose coefficients are `target`, `[r]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn add(
         &mut self,
         means: &PosteriorMeans<'_>,
@@ -91,7 +91,7 @@ pub(super) fn solve_regressions(factors: &[f64], right_hand_side: &[f64], rank: 
 }
 
 /// `sums += a ∘ b`, entry by entry.
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(super) fn add_products(sums: &mut [f64], a: &[f64], b: &[f64]) {
     for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
         *sum += a * b;

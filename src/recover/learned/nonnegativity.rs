@@ -51,7 +51,7 @@ impl NonNegativityPenalty {
     }
 
     /// Moves `z`, the mean of a posterior whose precision has the Cholesky factor `factor`, towards the minimum.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn apply(&self, factor: &[f64], z: &mut [f64]) {
         let mut negative = Vec::new();
         // The negative gradient, and K⁻¹ times it.

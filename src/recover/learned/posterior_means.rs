@@ -84,7 +84,7 @@ impl<'a> PosteriorMeans<'a> {
             ones: vec![1.0; rank],
         };
         vectorise(
-            #[inline(always)]
+            #[cfg_attr(target_arch = "x86_64", inline(always))]
             || {
                 let mut solver = PosteriorSolver::new(rank);
                 for index in 0..count {
@@ -105,7 +105,7 @@ impl<'a> PosteriorMeans<'a> {
 
     /// The predictors of an observation, each with its number below [`PREDICTORS`]: a constant 1, and the posterior means
     /// of its bright neighbours, `[r]`.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn predictors(
         &self,
         location: PixelObservationPosition,
@@ -117,7 +117,7 @@ impl<'a> PosteriorMeans<'a> {
     }
 
     /// Posterior mean of a neighbour, `[r]`; `None` outside the region and if it is not bright.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn neighbour(
         &self,
         location: PixelObservationPosition,
