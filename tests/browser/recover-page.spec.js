@@ -202,6 +202,24 @@ test.describe('a simulated object', () => {
   });
 });
 
+test('a simulation that cannot be loaded is told with its code, and tried again', async ({
+  openPage,
+}) => {
+  const page = await openPage('/recover.html', { locale: 'de' });
+  const wasm = '**/simulation_bg.wasm';
+  await page.context().route(wasm, (route) => route.abort());
+  const start = page.getByRole('button', { name: 'Wiederherstellen', exact: true });
+  await start.click();
+  const fault = page.getByRole('alert');
+  await expect(fault).toContainText('Die Simulation konnte nicht geladen werden');
+  await expect(fault).toContainText('Code: simulation-unavailable');
+  await page.context().unroute(wasm);
+  await start.click();
+  await expect(page.locator('#job-text')).toContainText('gelernt');
+  await expect(page.locator('#fault')).toBeEmpty();
+  await page.getByRole('button', { name: 'Abbrechen' }).click();
+});
+
 test.describe('an own capture', () => {
   test('is recovered from a folder, with its needs beforehand and its held-out SNR', async ({
     openPage,

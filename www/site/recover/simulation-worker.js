@@ -28,9 +28,13 @@ function load() {
 
 /** @returns {Promise<SimulationModule>} */
 async function start() {
-  const module = await import(url('simulation.js').href);
-  await module.default({ module_or_path: url('simulation_bg.wasm') });
-  return module;
+  try {
+    const module = await import(url('simulation.js').href);
+    await module.default({ module_or_path: url('simulation_bg.wasm') });
+    return module;
+  } catch (cause) {
+    throw Object.assign(new Error(String(cause)), { code: 'simulation-unavailable' });
+  }
 }
 
 /** @template T @param {T | undefined} value @returns {T} */

@@ -1,5 +1,7 @@
 /** Calls to the simulation worker, and its end. */
 
+import { PageFault } from './page-fault.js';
+
 /** @typedef {{ resolve: (result: any) => void, reject: (error: Error) => void, onProgress: ((share: number) => void) | undefined }} Call */
 
 export class SimulationWorker {
@@ -26,7 +28,7 @@ export class SimulationWorker {
     });
   }
 
-  /** Ends the worker and rejects its calls. The next call starts another. */
+  /** Ends the worker and rejects its calls. The next call starts another. @param {Error} [reason] */
   terminate(reason = new DOMException('The call was cancelled.', 'AbortError')) {
     this.#worker?.terminate();
     this.#worker = undefined;
@@ -45,13 +47,15 @@ export class SimulationWorker {
       }
       this.#calls.delete(id);
       if (error === undefined) call?.resolve(result);
+      else if (code === 'simulation-unavailable')
+        call?.reject(new PageFault(code, { reason: error }));
       else call?.reject(Object.assign(new Error(error), { code }));
     });
     worker.addEventListener('error', (event) => {
       // Without this, the browser would log the error a second time.
       event.preventDefault();
-      const message = event.message || 'its script could not be loaded';
-      this.terminate(new DOMException(`The simulation failed: ${message}`, 'OperationError'));
+      const reason = event.message || 'simulation-worker.js';
+      this.terminate(new PageFault('simulation-unavailable', { reason }));
     });
     return worker;
   }

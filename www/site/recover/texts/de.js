@@ -154,4 +154,6 @@ export default {
   'fault.patterns-blocked':
     'Der Browser hat das Musterfenster blockiert. Erlauben Sie dieser Seite neue Fenster, und öffnen Sie es noch einmal.',
   'fault.patterns-closed': 'Das Musterfenster ist geschlossen. Öffnen Sie es noch einmal.',
+  'fault.simulation-unavailable':
+    'Die Simulation konnte nicht geladen werden: {reason}. Prüfen Sie die Verbindung, und versuchen Sie es noch einmal.',
 };

@@ -80,4 +80,6 @@ export default {
   'fault.patterns-blocked':
     'The browser has blocked the pattern window. Allow pop-up windows for this page, and open it again.',
   'fault.patterns-closed': 'The pattern window is closed. Open it again.',
+  'fault.simulation-unavailable':
+    'The simulation could not be loaded: {reason}. Check the connection, and try again.',
 };

@@ -155,4 +155,6 @@ export default {
   'fault.patterns-blocked':
     'El navegador ha bloqueado la ventana de patrones. Permita las ventanas emergentes para esta página y ábrala de nuevo.',
   'fault.patterns-closed': 'La ventana de patrones está cerrada. Ábrala de nuevo.',
+  'fault.simulation-unavailable':
+    'No se pudo cargar la simulación: {reason}. Compruebe la conexión e inténtelo de nuevo.',
 };

@@ -155,4 +155,6 @@ export default {
   'fault.patterns-blocked':
     'Le navigateur a bloqué la fenêtre des motifs. Autorisez les fenêtres surgissantes pour cette page et ouvrez-la de nouveau.',
   'fault.patterns-closed': 'La fenêtre des motifs est fermée. Ouvrez-la de nouveau.',
+  'fault.simulation-unavailable':
+    'La simulation n’a pas pu être chargée : {reason}. Vérifiez la connexion et réessayez.',
 };

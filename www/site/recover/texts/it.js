@@ -155,4 +155,6 @@ export default {
   'fault.patterns-blocked':
     'Il browser ha bloccato la finestra dei motivi. Permettete le finestre popup per questa pagina e apritela di nuovo.',
   'fault.patterns-closed': 'La finestra dei motivi è chiusa. Apritela di nuovo.',
+  'fault.simulation-unavailable':
+    'La simulazione non è stata caricata: {reason}. Controlli la connessione e riprovi.',
 };

@@ -149,4 +149,6 @@ export default {
   'fault.patterns-blocked':
     'ブラウザーがパターンのウィンドウをブロックしました。このページのポップアップを許可し、もう一度開いてください。',
   'fault.patterns-closed': 'パターンのウィンドウが閉じられました。もう一度開いてください。',
+  'fault.simulation-unavailable':
+    'シミュレーションを読み込めませんでした：{reason}。接続を確認して、もう一度お試しください。',
 };

@@ -139,4 +139,5 @@ export default {
   'fault.camera-unstable': '摄像头画面始终不稳定。请固定摄像头和物体，并避开其他光线。',
   'fault.patterns-blocked': '浏览器拦截了图案窗口。请允许此页面弹出窗口，然后重新打开。',
   'fault.patterns-closed': '图案窗口已关闭。请重新打开。',
+  'fault.simulation-unavailable': '无法加载模拟程序：{reason}。请检查连接后重试。',
 };
