@@ -28,6 +28,8 @@ const launchOptions = chromiumOptions(
   `--use-file-for-fake-video-capture=${FILM}`,
 );
 test.use({ launchOptions });
+// In one worker: two would write the film at once.
+test.describe.configure({ mode: 'default' });
 
 /** Writes the files of a zip into a folder. @param {string} zip @param {string} folder */
 async function unpack(zip, folder) {
@@ -71,7 +73,11 @@ test('photographs patterns on a second screen, and recovers as ltm-export does',
   openPage,
   step,
 }) => {
-  const page = await openPage('/recover.html', { permissions: ['camera'] });
+  // Colours in transition would have too little contrast.
+  const page = await openPage('/recover.html', {
+    permissions: ['camera'],
+    reducedMotion: 'reduce',
+  });
   await page.evaluate(axe);
   const patterns = await prepare(page);
   await page.locator('#camera-side').selectOption('64');
