@@ -33,7 +33,7 @@ use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::CHANNELS;
 
 /// EM iterations from the first estimate, and from a prior that was learned from most of the same measurements.
-const EM_ITERATIONS: usize = 4;
+const EM_ITERATIONS: usize = 3;
 const EM_ITERATIONS_WARM: usize = 2;
 /// Groups of regions that sums are formed over. Fixed, so that results do not depend on the executor.
 const PARTS: usize = 8;

@@ -17,14 +17,14 @@ use crate::linalg::{self, add_scaled, dot};
 const MIN_VARIANCE_SHARE: f64 = 1e-9;
 
 /// One in so many observations whose posterior covariance is computed in an E step, where thousands are averaged. It
-/// takes two thirds of the time, and does not depend on y but through brightness and noise.
-const COVARIANCE_SAMPLING: usize = 4;
+/// takes twice the time of the rest, and does not depend on y but through brightness and noise.
+const COVARIANCE_SAMPLING: usize = 8;
 
 /// The inverse of a prior's covariance.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct PriorPrecision {
     /// C⁻¹, `[r, r]`.
-    matrix: Vec<f64>,
+    pub matrix: Vec<f64>,
     /// ln|C|.
     covariance_log_det: f64,
 }

@@ -29,8 +29,8 @@ const CANDIDATE_RANKS: [usize; 3] = [23, 31, 47];
 /// tells little of the components that 80 patterns hardly determine. What a smaller basis cannot represent is lost, but
 /// the prior keeps an undetermined component from doing harm.
 const MAX_ERROR_INCREASE: f64 = 0.02;
-/// EM iterations over the initial basis.
-const INITIAL_EM_ITERATIONS: usize = 20;
+/// Steps of EM over the initial basis. They do what 21 iterations did, to 0.1 dB of SNR, in half the time.
+pub(super) const INITIAL_EM_STEPS: [usize; 9] = [1, 1, 2, 1, 3, 1, 2, 3, 7];
 /// EM iterations over the truncated basis, on the training regions.
 const FINAL_EM_ITERATIONS: usize = 2;
 /// Training regions of the neighbour prior, and their side.
@@ -73,9 +73,9 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
             self.equations(&basis, &self.split.training, squares[i])
         });
         let min_brightness = min_reliable_brightness(&samples);
-        for _ in 0..INITIAL_EM_ITERATIONS {
+        for step in INITIAL_EM_STEPS {
             self.executor.check_cancelled()?;
-            prior.em_iteration(&samples, &min_brightness, self.executor);
+            prior.em_iteration(&samples, &min_brightness, step, self.executor);
         }
         drop(samples);
 
@@ -137,7 +137,7 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
         });
         let (prior, min_brightness) = (&mut model.prior, &model.min_brightness);
         for _ in 0..FINAL_EM_ITERATIONS {
-            prior.em_iteration(&equations, min_brightness, self.executor);
+            prior.em_iteration(&equations, min_brightness, 1, self.executor);
         }
         let start = model.neighbour_prior.take();
         if learn_neighbour_prior {
