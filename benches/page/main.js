@@ -1,7 +1,7 @@
 /**
  * Measures `<relightable-photo>` in Chromium: node main.js FOLDER, where FOLDER has photographs and their description in
  * photos.json. Prints tables and writes FOLDER/figures.json. A second argument selects parts: `frames`, `peers`,
- * `memory`.
+ * `memory`, `recovery`.
  *
  * A frame begins with a change by the page (`lightChanged()`, `torch`, `exposure`) and ends when the picture is
  * complete. Frames do not wait for the screen: the page's `requestAnimationFrame` is replaced. "video" sets new
@@ -29,6 +29,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { memory } from './memory.js';
 import { browserVersion, inPage, isSoftware, openPage, start } from './pages.js';
+import { recovery } from './recovery.js';
 
 /** @typedef {import('./hooks.js').Backend} Backend */
 /** @typedef {import('./frames.js').KindName} KindName */
@@ -56,7 +57,7 @@ const WAYS = [
 ];
 const KINDS = /** @type {const} */ (['video', 'torch', 'exposure']);
 
-const [folder = '', only = 'frames,peers,memory'] = process.argv.slice(2);
+const [folder = '', only = 'frames,peers,memory,recovery'] = process.argv.slice(2);
 const parts = new Set(only.split(','));
 /** @type {Photo[]} */
 const photos = JSON.parse(readFileSync(join(folder, 'photos.json'), 'utf8'));
@@ -374,6 +375,7 @@ try {
     const photos = held.map((photo) => ({ name: nameOf(photo), src: addressOf(photo) }));
     Object.assign(figures, await memory(addressOf(photoOf(SMALL, LEAST_RANK)), photos));
   }
+  if (parts.has('recovery')) Object.assign(figures, await recovery(folder));
   writeFileSync(join(folder, 'figures.json'), JSON.stringify(figures));
 } finally {
   await stop();
