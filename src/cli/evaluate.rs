@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::ltm_file::{PrefixLength, read_ltm};
 use super::process_resources::AllCoresExecutor;
 use super::report::{format_bytes, print_json, print_line};
-use crate::capture::{CameraRowSet, CaptureFolder, GroundTruth, LinearPhoto, PhotographRowReader};
+use crate::capture::{CaptureFolder, GroundTruth, PhotographRowReader};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light};
 use crate::study::{CaptureTruth, psnr};
@@ -167,13 +167,11 @@ fn add_error(
     errors: &mut [SnrAccumulator; CHANNELS],
     relighter: &mut CpuRelighter,
     light: &Light,
-    mut reader: PhotographRowReader,
+    reader: PhotographRowReader,
 ) -> Result<()> {
     relighter.relight(light, &AllCoresExecutor);
     let picture = relighter.linear();
-    let mut photo = LinearPhoto::new();
-    reader.read(&CameraRowSet::all(picture.extent.height), &mut photo)?;
-    reader.finish()?;
+    let (photo, _) = reader.read_all()?;
     for (predicted, measured) in picture.pixels.iter().zip(&photo) {
         for c in 0..CHANNELS {
             if measured[c].is_finite() {

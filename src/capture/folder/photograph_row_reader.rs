@@ -44,6 +44,16 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
         self.read_to(end, rows, photo)
     }
 
+    /// Reads the whole photograph, as [`read`](Self::read) does, and its number of saturated samples.
+    ///
+    /// # Errors
+    /// If the file is damaged or ends early.
+    pub fn read_all(mut self) -> Result<(LinearPhoto, usize), CaptureError> {
+        let mut photo = Vec::with_capacity(self.camera.extent().area());
+        self.read(&CameraRowSet::all(self.camera.height), &mut photo)?;
+        Ok((photo, self.finish()?))
+    }
+
     /// Reads the rest of the file and returns the number of saturated samples in the photograph.
     ///
     /// # Errors

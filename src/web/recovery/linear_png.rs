@@ -1,5 +1,6 @@
 //! Patterns and photographs that the page has as PNG, without a manifest.
 
+use js_sys::Float32Array;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::capture_files::PageFiles;
@@ -32,8 +33,8 @@ impl LinearPng {
 
     /// Three values for each pixel of a photograph; one or three for each element of a pattern.
     #[wasm_bindgen(getter)]
-    pub fn data(&self) -> Vec<f32> {
-        self.data.clone()
+    pub fn data(&self) -> Float32Array {
+        Float32Array::from(&self.data[..])
     }
 }
 

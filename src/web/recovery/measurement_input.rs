@@ -56,10 +56,9 @@ impl MeasurementInput {
         let mut saturated_samples = 0;
         ReportingExecutor::run(on_shot, |_| {
             for (&i, photo) in shots.iter().zip(&mut measurements.photos) {
-                let mut reader = folder.open_shot(i, &dark)?;
-                photo.reserve_exact(manifest.camera.extent().area());
-                reader.read(&rows, photo)?;
-                saturated_samples += reader.finish()?;
+                let (samples, saturated) = folder.open_shot(i, &dark)?.read_all()?;
+                *photo = samples;
+                saturated_samples += saturated;
                 report_job();
             }
             Ok::<_, CodedError>(())

@@ -5,7 +5,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::capture_files::PageFiles;
 use super::recovery_job::Recovery;
-use crate::capture::{CameraRowSet, CaptureFolder, LinearPhoto};
+use crate::capture::CaptureFolder;
 use crate::export;
 use crate::relight::{Light, reference};
 use crate::transport::{
@@ -100,14 +100,10 @@ impl RecoveredTransport {
         let folder = CaptureFolder::from_files(files)?;
         let manifest = folder.manifest();
         let dark = folder.read_dark()?;
-        let rows = CameraRowSet::all(manifest.camera.height);
         let mut sums = vec![0.0; 2];
         for i in (0..manifest.shots.len()).filter(|i| !used.contains(i)) {
             let light = folder.read_pattern(i)?.rgb();
-            let mut photo = LinearPhoto::new();
-            let mut reader = folder.open_shot(i, &dark)?;
-            reader.read(&rows, &mut photo)?;
-            reader.finish()?;
+            let (photo, _) = folder.open_shot(i, &dark)?.read_all()?;
             let error = self.picture_error(&light, photo.as_flattened())?;
             for (sum, error) in sums.iter_mut().zip(error) {
                 *sum += error;
