@@ -275,7 +275,7 @@ impl NeighbourStatistics {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::synthetic_equations;
+    use super::super::tests::{normal, synthetic_equations};
     use super::*;
     use crate::job_executor::SequentialExecutor;
     use crate::transport::{Extent, TileRect};
@@ -285,17 +285,6 @@ mod tests {
     const GRAM_DIAGONAL: [f64; 2] = [1.0, 0.02];
     const VARIANCE: f64 = 0.01;
     const OUTLIERS: [(u32, u32); 3] = [(10, 10), (28, 13), (15, 30)];
-
-    fn normal() -> impl FnMut() -> f64 {
-        let mut state = 0x9E37_79B9_7F4A_7C15u64;
-        let mut uniform = move || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
 
     fn region(side: u32) -> TileRect {
         TileRect {

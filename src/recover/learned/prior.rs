@@ -169,10 +169,12 @@ impl Prior {
         }
         covariance.iter_mut().for_each(|c| *c /= count);
         linalg::mirror_upper(&mut covariance, rank);
-        let change = linalg::multiply(&covariance, &self.precision.matrix, rank, rank);
-        for _ in 1..step {
-            covariance = linalg::multiply(&change, &covariance, rank, rank);
-            linalg::mirror_upper(&mut covariance, rank);
+        if step > 1 {
+            let change = linalg::multiply(&covariance, &self.precision.matrix, rank, rank);
+            for _ in 1..step {
+                covariance = linalg::multiply(&change, &covariance, rank, rank);
+                linalg::mirror_upper(&mut covariance, rank);
+            }
         }
         self.precision = PriorPrecision::new(&covariance, rank);
         self.covariance = covariance;
@@ -207,7 +209,7 @@ impl EStepStatistics {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::synthetic_equations;
+    use super::super::tests::{normal, synthetic_equations};
     use super::super::training::INITIAL_EM_STEPS;
     use super::*;
     use crate::job_executor::SequentialExecutor;
@@ -218,17 +220,6 @@ mod tests {
     const GRAM_DIAGONAL: [f64; 3] = [1.0, 0.1, 0.01];
     const DEVIATIONS: [f64; 3] = [1.0, 0.5, 0.3];
     const VARIANCE: f64 = 0.01;
-
-    fn normal() -> impl FnMut() -> f64 {
-        let mut state = 0x9E37_79B9_7F4A_7C15u64;
-        let mut uniform = move || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
 
     /// The variances that EM learns with these steps.
     fn learn(steps: &[usize]) -> [f64; 3] {

@@ -172,6 +172,18 @@ fn learn(
     LearnedRecovery::new(&preparation, &mean)
 }
 
+/// A reproducible stream of nearly normal numbers of variance 1.
+pub(super) fn normal() -> impl FnMut() -> f64 {
+    let mut state = 0x9E37_79B9_7F4A_7C15u64;
+    let mut uniform = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
 /// Observations of coefficients `z`, `[pixel, channel, r]`, with brightness 1, one diagonal Gram matrix, `[r]`, and
 /// standard normal numbers `normal` for the noise.
 pub(super) fn synthetic_equations(
