@@ -1,4 +1,4 @@
-//! A simulated scene, its photographs, and what is known of its transport: for the site's page on recovery.
+//! A simulated scene, its photographs and its true transport, for the site's page on recovery.
 
 use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -10,7 +10,7 @@ use crate::simulate::{
     PatternEnsemble, PatternImage, SceneKind, SimulatedCapture, SimulatedScene, emitted_pattern,
 };
 use crate::transport::{
-    CHANNELS, CameraPixel, Extent, Geometry, SingularValueAnalysis, TileRect,
+    CHANNELS, CameraPixel, Extent, Geometry, KnownTransport, SingularValueAnalysis, TileRect,
     TileTransportFunctions, Window, transport_error,
 };
 use crate::web::CodedError;
@@ -54,6 +54,16 @@ impl SimulatedScene for TabulatedScene {
 
     fn transport_function(&self, pixel: CameraPixel, tau: &mut [[f32; CHANNELS]]) {
         tau.copy_from_slice(self.function(self.geometry.camera.index(pixel)));
+    }
+}
+
+impl KnownTransport for TabulatedScene {
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    fn transport_function(&self, pixel: CameraPixel, tau: &mut [[f32; CHANNELS]]) {
+        SimulatedScene::transport_function(self, pixel, tau);
     }
 }
 
@@ -248,12 +258,7 @@ impl Simulation {
     ) -> Result<Vec<f64>, CodedError> {
         let geometry = with_window(&self.scene.geometry, window)?;
         let functions = tile_functions(&geometry, [x, y, width, height], functions)?;
-        let capture = SimulatedCapture {
-            scene: &self.scene,
-            electrons: 0.0,
-            seed: 0,
-        };
-        let error = transport_error(&capture, &geometry, &functions);
+        let error = transport_error(&self.scene, &geometry, &functions);
         Ok(vec![error.signal, error.error])
     }
 }
