@@ -4,6 +4,9 @@
 
 pub mod relit;
 
+use std::fs;
+use std::path::Path;
+
 use relightable_photo::format::HEADER_BYTES;
 use relightable_photo::transport::{
     Correspondence, Extent, Geometry, TileTransportFunctions, Window,
@@ -164,4 +167,18 @@ fn seal_header(file: &mut [u8]) {
     }
     let crc = crc32c::crc32c(&file[..HEADER_BYTES - 4]);
     file[HEADER_BYTES - 4..HEADER_BYTES].copy_from_slice(&crc.to_le_bytes());
+}
+
+/// Copies a folder with all its contents.
+pub fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy_folder(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
 }
