@@ -27,6 +27,7 @@ export const FOLDERS = {
 export const FILES = {
   '/fonts/source-serif-4.woff2': font('source-serif-4-latin-wght-normal.woff2'),
   '/fonts/source-serif-4-italic.woff2': font('source-serif-4-latin-wght-italic.woff2'),
+  '/vendor/zip.js': join(repository, 'node_modules/@zip.js/zip.js/index-native.min.js'),
   '/vendor/minisearch.js': join(repository, 'node_modules/minisearch/dist/es/index.js'),
 };
 

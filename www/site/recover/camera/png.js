@@ -1,10 +1,13 @@
 /** Writes PNG files with the samples that captures have, which a canvas cannot write. */
 
-import { crc32 } from './crc32.js';
-
 const SIGNATURE = Uint8Array.of(137, 80, 78, 71, 13, 10, 26, 10);
 const GREY = 0;
 const RGB = 2;
+const CRC_TABLE = Uint32Array.from({ length: 256 }, (_, byte) => {
+  let value = byte;
+  for (let i = 0; i < 8; i += 1) value = value & 1 ? 0xedb88320 ^ (value >>> 1) : value >>> 1;
+  return value;
+});
 
 /** 8-bit grey. @param {number} width @param {number} height @param {Uint8Array} codes */
 export function greyPng(width, height, codes) {
@@ -50,4 +53,11 @@ function chunk(name, data = new Uint8Array()) {
 async function deflate(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new CompressionStream('deflate'));
   return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** The checksum of a chunk. @param {Uint8Array} bytes */
+function crc32(bytes) {
+  let crc = 0xffffffff;
+  for (const byte of bytes) crc = (CRC_TABLE[(crc ^ byte) & 255] ?? 0) ^ (crc >>> 8);
+  return (crc ^ 0xffffffff) >>> 0;
 }
