@@ -14,6 +14,7 @@ import type {
 export type { PhotographSource, TransferredPhoto } from './photo/types.js';
 export { openCaptureFolder } from './recover/capture-folder.js';
 export { estimateRecovery } from './recover/estimate.js';
+export { sizeOfInput as recoverySize } from './recover/read-input.js';
 export type {
   Correspondence,
   EvaluationPair,

@@ -4,9 +4,6 @@ import { recoverCapture } from './capture-recovery.js';
 import { onLanguageChange, t } from './language.js';
 import { recoverModule, recoverSettings } from './recovery.js';
 
-/** Of the shots of a folder so many are held out. */
-const HELD_OUT_SHARE = 0.1;
-
 /**
  * @typedef {import('./types.js').Result} Result
  * @typedef {import('./types.js').ReportStage} ReportStage
@@ -88,15 +85,16 @@ export class OwnCapture {
     return { method: value('method'), window: value('window') };
   }
 
-  /** Says what was chosen, and what its recovery takes. */
+  /** Shows name and size of the chosen capture, and the memory and time that its recovery takes. */
   async #describe() {
     const capture = this.#capture;
     if (!capture) return;
     const { name, files } = capture;
     const said = [t('own.files', { name, files: files.size })];
-    const size = await manifestSize(files);
+    const { estimateRecovery, recoverySize } = await recoverModule();
+    // The recovery reports a manifest without a size.
+    const size = await recoverySize({ folder: files });
     if (size) {
-      const { estimateRecovery } = await recoverModule();
       const estimate = estimateRecovery(size, recoverSettings(this.#settings()));
       said.push(
         t('fact.size', { ...size }),
@@ -123,21 +121,5 @@ export class OwnCapture {
       const { dataTransfer } = event;
       if (dataTransfer?.items[0]) open(dataTransfer.files[0]?.name ?? '', dataTransfer);
     });
-  }
-}
-
-/** The size of the recovery that a manifest describes; nothing if it cannot be read, which the recovery reports. @param {ReadonlyMap<string, Blob>} files */
-async function manifestSize(files) {
-  try {
-    const { camera, light, shots } = JSON.parse((await files.get('capture.json')?.text()) ?? '');
-    return {
-      width: camera.width,
-      height: camera.height,
-      lightWidth: light.width,
-      lightHeight: light.height,
-      photographs: Math.ceil(shots.length * (1 - HELD_OUT_SHARE)),
-    };
-  } catch {
-    return undefined;
   }
 }
