@@ -8,7 +8,7 @@ const HEIGHT = 300;
 const MIN_WIDTH = 260;
 const MAX_WIDTH = 760;
 /** Series beyond these repeat a style. */
-export const SERIES_STYLES = 5;
+const SERIES_STYLES = 5;
 
 /** @typedef {{ min: number, max: number, ticks: number[], label: string, isLogarithmic?: boolean, format: (value: number) => string }} Axis */
 /** @typedef {{ points: { x: number, y: number }[], hasMarkers?: boolean }} Series */
@@ -56,6 +56,19 @@ export function drawPlot(container, { label, x, y, series }) {
     }
   }
   container.replaceChildren(svg);
+}
+
+/** The names of the series, in their styles. @param {string[]} labels */
+export function legend(labels) {
+  const list = document.createElement('ul');
+  list.className = 'legend';
+  for (const [i, label] of labels.entries()) {
+    const item = document.createElement('li');
+    item.className = `series-${i % SERIES_STYLES}`;
+    item.textContent = label;
+    list.append(item);
+  }
+  return list;
 }
 
 /** Round values from at most `min` to at least `max`, at most eight. @param {number} min @param {number} max */

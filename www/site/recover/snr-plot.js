@@ -1,7 +1,7 @@
 /** SNR by the number of patterns: one line for each choice of settings, a point for each recovery. */
 
 import { formatNumber, onLanguageChange, t } from './language.js';
-import { drawPlot, roundTicks, SERIES_STYLES } from './line-plot.js';
+import { drawPlot, legend, roundTicks } from './line-plot.js';
 
 const PATTERN_TICKS = [5, 10, 20, 40, 80, 160];
 
@@ -82,19 +82,6 @@ export class SnrPlot {
       own.filter((name, i) => names.some((other) => other[i] !== name)).join(', '),
     );
   }
-}
-
-/** @param {string[]} labels */
-function legend(labels) {
-  const list = document.createElement('ul');
-  list.className = 'legend';
-  for (const [i, label] of labels.entries()) {
-    const item = document.createElement('li');
-    item.className = `series-${i % SERIES_STYLES}`;
-    item.textContent = label;
-    list.append(item);
-  }
-  return list;
 }
 
 /** @param {Line[]} lines @param {string[]} labels */

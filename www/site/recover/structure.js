@@ -1,7 +1,7 @@
 /** The structure of the recovered light transport matrix: its band and its singular values. */
 
 import { formatNumber, onLanguageChange, t } from './language.js';
-import { drawPlot } from './line-plot.js';
+import { drawPlot, legend } from './line-plot.js';
 import { drawHeat, largest } from './pictures.js';
 import { SimulationWorker } from './simulation.js';
 import { tilesOf } from './tiles.js';
@@ -10,8 +10,6 @@ import { tilesOf } from './tiles.js';
 const DELAY_MS = 700;
 /** Smallest singular value that is shown, relative to the largest. */
 const MIN_RELATIVE_VALUE = 1e-4;
-/** Side of the true tiles. */
-const TILE_SIDE = 32;
 
 /** @typedef {import('./types.js').Result} Result */
 /** @typedef {import('./simulation-worker.js').TileFunctions} TileFunctions */
@@ -56,7 +54,12 @@ export class Structure {
     const { width, height, lightWidth, lightHeight } = recovered;
     const size = { width, height, lightWidth, lightHeight, correspondence };
     await worker.call('analyse', { ...size, window: recovered.window });
-    for await (const tile of tilesOf(recovered)) await worker.call('addTile', tile);
+    const rects = [];
+    for await (const tile of tilesOf(recovered)) {
+      const { x, y, width, height } = tile;
+      rects.push({ x, y, width, height });
+      await worker.call('addTile', tile);
+    }
     const { cells, values } = await worker.call('band');
     if (worker !== this.#worker) return;
     const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('band'));
@@ -70,9 +73,9 @@ export class Structure {
     const own = await worker.call('singularValues');
     if (truth && this.#truth?.key !== truth.key) {
       await worker.call('analyse', { ...size, window: truth.window });
-      for (const tile of tileRects(recovered)) {
-        const values = await truth.worker.call('functions', tile);
-        await worker.call('addTile', { ...tile, values });
+      for (const rect of rects) {
+        const values = await truth.worker.call('functions', rect);
+        await worker.call('addTile', { ...rect, values });
       }
       this.#truth = { key: truth.key, values: await worker.call('singularValues') };
     }
@@ -108,7 +111,8 @@ export class Structure {
       `${formatNumber(100 * (value ?? 0), 2)} %`;
     const container = /** @type {HTMLElement} */ (document.getElementById('singular-plot'));
     const plot = document.createElement('div');
-    container.replaceChildren(legend(truth !== undefined), plot);
+    const names = truth ? ['light.recovered', 'light.true'] : ['light.recovered'];
+    container.replaceChildren(legend(names.map((name) => t(name))), plot);
     drawPlot(plot, {
       label: t('singular.label', {
         middle: percent(own[Math.floor(own.length / 2)]),
@@ -131,33 +135,5 @@ export class Structure {
       },
       series: relative.map((values) => ({ points: values.map((y, i) => ({ x: i + 1, y })) })),
     });
-  }
-}
-
-/** @param {boolean} hasTruth */
-function legend(hasTruth) {
-  const list = document.createElement('ul');
-  list.className = 'legend';
-  const names = hasTruth ? ['light.recovered', 'light.true'] : ['light.recovered'];
-  for (const [i, name] of names.entries()) {
-    const item = document.createElement('li');
-    item.className = `series-${i}`;
-    item.textContent = t(name);
-    list.append(item);
-  }
-  return list;
-}
-
-/** @param {{ width: number, height: number }} picture */
-function* tileRects({ width, height }) {
-  for (let y = 0; y < height; y += TILE_SIDE) {
-    for (let x = 0; x < width; x += TILE_SIDE) {
-      yield {
-        x,
-        y,
-        width: Math.min(TILE_SIDE, width - x),
-        height: Math.min(TILE_SIDE, height - y),
-      };
-    }
   }
 }
