@@ -1,7 +1,7 @@
 /** What a recovery takes: memory of all workers, and time. Measured, see `docs/recover.md`. */
 
 import { PhotoError } from '../shared/errors.js';
-import type { StageSeconds } from './progress-tracker.js';
+import { type StageSeconds, sumSeconds } from './progress-tracker.js';
 import type { PictureSize } from './protocol.js';
 import type { RecoverOptions, RecoveryEstimate, RecoverySettings, RecoverySize } from './types.js';
 
@@ -37,7 +37,7 @@ export function estimateRecovery(
   settings: RecoverySettings = {},
   options: Pick<RecoverOptions, 'workers'> = {},
 ): RecoveryEstimate {
-  const seconds = stageSeconds(size, settings, options).reduce((sum, [, time]) => sum + time, 0);
+  const seconds = sumSeconds(stageSeconds(size, settings, options));
   return { memoryBytes: memoryBytes(size, settings, options), seconds };
 }
 

@@ -41,7 +41,7 @@ export class ProgressTracker {
   /** So much of the current stage is done, 0 to 1; by default as much as its time suggests. */
   report(share = this.#shareByTime()): void {
     if (!this.onProgress) return;
-    const total = this.stages.reduce((sum, [, seconds]) => sum + seconds, 0);
+    const total = sumSeconds(this.stages);
     const before = sumSeconds(this.stages.slice(0, this.#index));
     const [stage, expected] = this.#current;
     const fraction = Math.min(1, (before + share * expected) / total);
@@ -77,6 +77,7 @@ export class ProgressTracker {
   }
 }
 
-function sumSeconds(stages: StageSeconds): number {
+/** Expected time of some stages together. */
+export function sumSeconds(stages: StageSeconds): number {
   return stages.reduce((sum, [, seconds]) => sum + seconds, 0);
 }

@@ -8,16 +8,18 @@ import type { PhotographInput } from './types.js';
 const PNG_HEADER_BYTES = 24;
 const PNG_SIGNATURE = 0x89504e47;
 
+/** A PNG. */
+type FileInput = Blob | ArrayBuffer | Uint8Array;
+
 /** Nothing of it is copied yet. Rejects with `recover-options` if it is no picture. */
 export async function toSentPicture(input: PhotographInput, name: string): Promise<SentPicture> {
-  if (isBytes(input)) return new Blob([input as Uint8Array<ArrayBuffer>]);
+  if (isFile(input)) return toFile(input);
   if (isCanvas(input)) {
     return createImageBitmap(input).catch((cause: unknown) => {
       const message = `${name} cannot be read: ${messageOf(cause)}.`;
       throw new PhotoError('recover-options', message, cause);
     });
   }
-  if (input instanceof Blob) return input;
   if (typeof input === 'object' && input !== null && 'width' in input) {
     if (!('data' in input) || !(input.data instanceof Float32Array)) return input as ImageData;
     const { width, height, data } = input;
@@ -31,12 +33,11 @@ export async function toSentPicture(input: PhotographInput, name: string): Promi
 
 /** The size of a picture; zero if it is a file that is no PNG, which the worker's decoder reports. */
 export async function sizeOf(input: PhotographInput): Promise<PictureSize> {
-  if (!isBytes(input) && !(input instanceof Blob)) {
+  if (!isFile(input)) {
     const { width, height } = input;
     return { width, height };
   }
-  const file = input instanceof Blob ? input : new Blob([input as Uint8Array<ArrayBuffer>]);
-  const header = new DataView(await file.slice(0, PNG_HEADER_BYTES).arrayBuffer());
+  const header = new DataView(await toFile(input).slice(0, PNG_HEADER_BYTES).arrayBuffer());
   if (header.byteLength < PNG_HEADER_BYTES || header.getUint32(0) !== PNG_SIGNATURE) {
     return { width: 0, height: 0 };
   }
@@ -45,17 +46,17 @@ export async function sizeOf(input: PhotographInput): Promise<PictureSize> {
 
 /** Whether the picture has 8-bit codes. */
 export function hasCodes(input: PhotographInput): boolean {
-  if (isBytes(input) || input instanceof Blob) return false;
+  if (isFile(input)) return false;
   return !('data' in input) || !(input.data instanceof Float32Array);
 }
 
 /** Whether the picture is a PNG. */
-export function isFile(input: PhotographInput): boolean {
-  return isBytes(input) || input instanceof Blob;
+export function isFile(input: PhotographInput): input is FileInput {
+  return input instanceof Blob || input instanceof ArrayBuffer || input instanceof Uint8Array;
 }
 
-function isBytes(input: PhotographInput): input is ArrayBuffer | Uint8Array {
-  return input instanceof ArrayBuffer || input instanceof Uint8Array;
+function toFile(input: FileInput): Blob {
+  return input instanceof Blob ? input : new Blob([input as Uint8Array<ArrayBuffer>]);
 }
 
 function isCanvas(input: PhotographInput): input is HTMLCanvasElement | OffscreenCanvas {
