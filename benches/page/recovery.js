@@ -4,22 +4,17 @@
  */
 
 import { execFileSync } from 'node:child_process';
-import { readdirSync, readFileSync } from 'node:fs';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { FILES, FIXTURE } from '../../tests/browser/recovery-page.js';
 import { openPage } from './pages.js';
 
-const REPOSITORY = join(import.meta.dirname, '../..');
-/** 64 by 64 camera pixels, 32 by 32 light elements, 60 patterns. */
-const CAPTURE = join(REPOSITORY, 'tests/fixtures/glass-s');
-const EXPORTER = join(REPOSITORY, 'target/release/ltm-export');
+const EXPORTER = join(import.meta.dirname, '../../target/release/ltm-export');
 const METHODS = ['learned', 'nnls'];
 /** Rounds over both programs; the fastest counts. */
 const TURNS = 3;
 
-const files = readdirSync(CAPTURE, { recursive: true, encoding: 'utf8' })
-  .map((name) => name.replaceAll('\\', '/'))
-  .filter((name) => /\.(json|png)$/.test(name) && !name.startsWith('truth'))
-  .map((name) => [name, readFileSync(join(CAPTURE, name)).toString('base64')]);
+const files = FILES.map((name) => [name, readFileSync(join(FIXTURE, name)).toString('base64')]);
 
 /**
  * @param {string} method
@@ -56,7 +51,7 @@ async function inPage(method, workers) {
 function natively(method, file) {
   const options = ['--method', method, '--json', '-o', file];
   const env = { ...process.env, RAYON_NUM_THREADS: '1' };
-  const output = execFileSync(EXPORTER, ['recover', CAPTURE, ...options], {
+  const output = execFileSync(EXPORTER, ['recover', FIXTURE, ...options], {
     env,
     encoding: 'utf8',
     stdio: ['ignore', 'pipe', 'ignore'],

@@ -104,7 +104,7 @@ function srgb(linear) {
 }
 
 /** Nearly normal numbers, always the same. */
-function noise() {
+export function noise() {
   let state = 1;
   const uniform = () => {
     state = (Math.imul(state, 1664525) + 1013904223) >>> 0;

@@ -9,7 +9,8 @@ import { Uint8ArrayReader, Uint8ArrayWriter, ZipWriter } from '@zip.js/zip.js';
 
 export const FIXTURE = join(import.meta.dirname, '../fixtures/glass-s');
 
-const FILES = readdirSync(FIXTURE, { recursive: true, encoding: 'utf8' })
+/** Names of the fixture's files, without the true transport. */
+export const FILES = readdirSync(FIXTURE, { recursive: true, encoding: 'utf8' })
   .map((name) => name.replaceAll('\\', '/'))
   .filter((name) => /\.(json|png)$/.test(name) && !name.startsWith('truth'));
 

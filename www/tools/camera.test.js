@@ -2,6 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { noise } from '../../tests/browser/camera-film.js';
 import { FrameAverager } from '../site/recover/camera/frame-averager.js';
 import { lightPatterns } from '../site/recover/camera/light-patterns.js';
 import { photographPatterns } from '../site/recover/camera/photograph-patterns.js';
@@ -9,16 +10,6 @@ import { photographPatterns } from '../site/recover/camera/photograph-patterns.j
 const SIDE = 16;
 const SAMPLES = 3 * SIDE * SIDE;
 const signal = new AbortController().signal;
-
-/** Nearly normal numbers, always the same. */
-function noise() {
-  let state = 1;
-  const uniform = () => {
-    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-    return state / 2 ** 32;
-  };
-  return () => 2 * (uniform() + uniform() + uniform() - 1.5);
-}
 
 /** A picture of one colour on the left and another on the right. @param {number} left @param {number} right */
 function halves(left, right) {
