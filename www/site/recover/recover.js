@@ -1,4 +1,4 @@
-/** The page "Recover": from photographs to a relightable photograph, and what it shows. */
+/** The page "Recover": recovers a relightable photograph, and shows its pictures and its light transport. */
 
 import { CameraCapture } from './camera/camera-capture.js';
 import { Job } from './job.js';

@@ -86,7 +86,7 @@ export class SimulatedObject {
   }
 
   /**
-   * Simulates what is missing, recovers, and compares.
+   * Simulates scene and photographs unless they exist, recovers, and compares with the true transport.
    *
    * @param {Settings} settings
    * @param {{ signal: AbortSignal, report: ReportStage }} options

@@ -65,7 +65,7 @@ export interface PreparationSummary {
   readonly expectedSnr: number | undefined;
 }
 
-/** What is known once all tiles are recovered. */
+/** The result of a recovery, after its last tile. */
 export interface RecoverySummary {
   readonly lightWidth: number;
   readonly lightHeight: number;

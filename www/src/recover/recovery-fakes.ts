@@ -97,7 +97,7 @@ export class FakeWorker implements RecoveryWorker {
 
   postMessage(request: WorkerRequest<RecoveryTask>, transfer: Transferable[]): void {
     if (this.hasEnded) throw new Error('a worker that has ended gets no requests');
-    // Detaches what is transferred, as browsers do.
+    // Detaches transferred buffers, as browsers do.
     const { id, task } = structuredClone(request, { transfer: transfer as ArrayBuffer[] });
     const { method, args } = task;
     this.log.push(method);

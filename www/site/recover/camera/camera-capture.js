@@ -147,7 +147,7 @@ export class CameraCapture {
       );
       this.#statusTexts = () => describeQuality(quality);
     } catch (error) {
-      // What was photographed is not lost.
+      // The photographs taken so far are kept.
       const fixed = patterns.filter(({ kind }) => kind !== 'random').length;
       if (!signal.aborted && photographs.length >= fixed + MIN_RANDOM_PATTERNS) {
         await this.#keep(photographs, camera.side);
