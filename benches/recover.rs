@@ -128,12 +128,9 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TileTransportFunctions>) {
 
 fn prepare(measurements: &Measurements, method: Method) -> PreparedRecovery {
     let window = Window::new(WINDOW).unwrap();
-    PreparedRecovery::prepare(
-        measurements,
-        RecoverySettings { method, window },
-        &SequentialExecutor,
-    )
-    .unwrap()
+    let settings = RecoverySettings { method, window };
+    let preparation = PreparedRecovery::prepare(measurements, settings, &SequentialExecutor);
+    pollster::block_on(preparation).unwrap()
 }
 
 fn tile(

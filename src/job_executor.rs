@@ -1,13 +1,29 @@
-//! Runs independent jobs, on one thread or on many, until the caller cancels.
+//! Runs independent jobs, on one thread, on many, or in several processes, until the caller cancels.
 //!
 //! No algorithm of this library starts a thread. It divides its work into independent jobs and gives these to an
 //! [`Executor`]: the command line's uses all cores, a browser's the thread that calls.
+//!
+//! A group of processes without common memory, as the workers of a page are, can run one algorithm together. All run it
+//! on the same input, each does its share of the jobs, and [`all_gather`](Executor::all_gather) and
+//! [`all_reduce`](Executor::all_reduce) give every process the results of all, as the operations of MPI with these names
+//! do. Sums have the same bits in groups of every size. Where functions are `async`, they wait for the other processes;
+//! with an executor without a group they never wait.
 
+use std::future::{Future, ready};
+use std::ops::Range;
+
+use bytemuck::{Pod, pod_collect_to_vec};
 use thiserror::Error;
+
+use crate::linalg::add_scaled;
+
+/// Number of jobs whose results [`all_reduce`](Executor::all_reduce) sums. Fixed, so that rounding does not depend on
+/// the number of threads or processes.
+pub const PARTS: usize = 8;
 
 /// Runs independent jobs in any order and on any number of threads.
 pub trait Executor: Sync {
-    /// Runs `job(0)` to `job(count - 1)` and returns their results in this order.
+    /// Runs `job(0)` to `job(count - 1)` in this process and returns their results in this order.
     fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync + Send) -> Vec<T>;
 
     /// Whether the caller has cancelled the work. Algorithms ask between stages of a few seconds.
@@ -25,9 +41,109 @@ pub trait Executor: Sync {
             false => Ok(()),
         }
     }
+
+    /// This process's share of `count` jobs: all, unless there is a group.
+    fn own_jobs(&self, count: usize) -> Range<usize> {
+        0..count
+    }
+
+    /// Sends `own` to the other processes of the group; returns what all have sent, in their order.
+    ///
+    /// # Errors
+    /// [`Cancelled`] if another process is lost.
+    fn exchange(&self, own: Vec<Vec<u8>>) -> impl Future<Output = Result<Vec<Vec<u8>>, Cancelled>> {
+        ready(Ok(own))
+    }
+
+    /// Runs `job(0)` to `job(count - 1)`, divided among the processes of the group; every process gets all results, in
+    /// this order.
+    ///
+    /// # Errors
+    /// Those of [`exchange`](Self::exchange).
+    fn all_gather<T: Pod + Send>(
+        &self,
+        count: usize,
+        job: impl Fn(usize) -> Vec<T> + Sync + Send,
+    ) -> impl Future<Output = Result<Vec<Vec<T>>, Cancelled>> {
+        async move {
+            let own = self.own_jobs(count);
+            let results = self.map(own.len(), |i| pod_collect_to_vec(&job(own.start + i)));
+            let all = self.exchange(results).await?;
+            Ok(all
+                .iter()
+                .map(|result| pod_collect_to_vec(result))
+                .collect())
+        }
+    }
+
+    /// Adds `job(0)` to `job(PARTS - 1)`, divided among the processes of the group, to sums that are zero at first; every
+    /// process gets the total. Results of jobs are added in pairs, then pairs of pairs.
+    ///
+    /// # Errors
+    /// Those of [`exchange`](Self::exchange).
+    fn all_reduce<T: Sums>(
+        &self,
+        zeros: impl Fn() -> T + Sync + Send,
+        job: impl Fn(usize, &mut T) + Sync + Send,
+    ) -> impl Future<Output = Result<T, Cancelled>> {
+        async move {
+            let own = self.own_jobs(PARTS);
+            let leaves = self.map(own.len(), |i| {
+                let mut sums = zeros();
+                job(own.start + i, &mut sums);
+                PartialSum {
+                    level: 0,
+                    index: own.start + i,
+                    values: values(&mut sums),
+                }
+            });
+            let own = add_pairs(leaves).into_iter().map(PartialSum::into_message);
+            let all = self.exchange(own.collect()).await?;
+            let all = all.iter().map(|message| PartialSum::from_message(message));
+            let total = add_pairs(all.collect()).pop().ok_or(Cancelled)?;
+            let mut sums = zeros();
+            set_values(&mut sums, &total.values);
+            Ok(sums)
+        }
+    }
 }
 
-/// The caller has cancelled the work.
+/// Sums, which can be added to others of the same lengths.
+pub trait Sums {
+    /// Visits all, in the same order each time.
+    fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64]));
+}
+
+impl<T: Sums> Sums for Vec<T> {
+    fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64])) {
+        self.iter_mut().for_each(|sums| sums.visit(visitor));
+    }
+}
+
+/// All sums in one list.
+pub fn values(sums: &mut dyn Sums) -> Vec<f64> {
+    let mut values = Vec::new();
+    sums.visit(&mut |slice| values.extend_from_slice(slice));
+    values
+}
+
+/// Sets all sums to those of a list, as far as it goes.
+pub fn set_values(sums: &mut dyn Sums, values: &[f64]) {
+    let mut values = values.iter();
+    sums.visit(&mut |slice| {
+        let pairs = slice.iter_mut().zip(&mut values);
+        pairs.for_each(|(sum, value)| *sum = *value);
+    });
+}
+
+/// Adds `other` to `sums`.
+pub fn add(sums: &mut dyn Sums, other: &mut dyn Sums) {
+    let mut total = values(sums);
+    add_scaled(&mut total, 1.0, &values(other));
+    set_values(sums, &total);
+}
+
+/// The caller has cancelled the work, or a process of the group is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the work was cancelled")]
 pub struct Cancelled;
@@ -40,4 +156,54 @@ impl Executor for SequentialExecutor {
     fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         (0..count).map(job).collect()
     }
+}
+
+/// A node of the binary tree by which the results of [`PARTS`] jobs are added.
+struct PartialSum {
+    /// Height above the leaves.
+    level: usize,
+    /// Number among the nodes of its level.
+    index: usize,
+    values: Vec<f64>,
+}
+
+impl PartialSum {
+    /// Whether both are children of one node.
+    fn is_left_of(&self, right: &Self) -> bool {
+        self.level == right.level && self.index.is_multiple_of(2) && self.index + 1 == right.index
+    }
+
+    fn into_message(self) -> Vec<u8> {
+        let mut values = self.values;
+        values.extend([self.level as f64, self.index as f64]);
+        pod_collect_to_vec(&values)
+    }
+
+    fn from_message(message: &[u8]) -> Self {
+        let mut values: Vec<f64> = pod_collect_to_vec(message);
+        let mut pop = || values.pop().unwrap_or_default() as usize;
+        let [index, level] = [pop(), pop()];
+        Self {
+            level,
+            index,
+            values,
+        }
+    }
+}
+
+/// Adds neighbours that are children of one node, until none are left.
+fn add_pairs(nodes: Vec<PartialSum>) -> Vec<PartialSum> {
+    let mut added: Vec<PartialSum> = Vec::new();
+    for mut right in nodes {
+        while let Some(mut left) = added.pop_if(|left| left.is_left_of(&right)) {
+            add_scaled(&mut left.values, 1.0, &right.values);
+            right = PartialSum {
+                level: left.level + 1,
+                index: left.index / 2,
+                values: left.values,
+            };
+        }
+        added.push(right);
+    }
+    added
 }

@@ -2,8 +2,10 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 /// A set of camera rows, stored as disjoint strips.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CameraRowSet {
     /// From the top down; none empty, none adjacent to the next.
     strips: Vec<Range<u32>>,

@@ -43,7 +43,7 @@ pub type LinearPhoto = Vec<[f32; CHANNELS]>;
 /// these may be strips spread over the picture, of which only tiles that are loaded whole
 /// ([`has_tile`](Self::has_tile)) may be used. While a tile is recovered they include the tile and the rows around it
 /// that its recovery asked for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Measurements {
     /// The camera grid, `N` pixels.
     pub camera: Extent,

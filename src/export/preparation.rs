@@ -49,7 +49,7 @@ pub fn has_implausible_saturation(saturated: usize, measurements: &Measurements)
 ///
 /// # Errors
 /// Those of [`PreparedRecovery::prepare`], and [`RecoverError::IndistinctPhotographs`].
-pub fn prepare(
+pub async fn prepare(
     measurements: &Measurements,
     method: Method,
     window: Option<Window>,
@@ -58,12 +58,12 @@ pub fn prepare(
     let (window, band) = match window {
         Some(window) => (window, None),
         None => {
-            let estimate = WindowSizeEstimate::from_measurements(measurements, executor)?;
+            let estimate = WindowSizeEstimate::from_measurements(measurements, executor).await?;
             (estimate.window, Some(estimate.band))
         }
     };
     let settings = RecoverySettings { method, window };
-    let recovery = PreparedRecovery::prepare(measurements, settings, executor)?;
+    let recovery = PreparedRecovery::prepare(measurements, settings, executor).await?;
     match recovery.holdout_validation() {
         Some(validation) if !validation.has_signal() => Err(RecoverError::IndistinctPhotographs),
         _ => Ok(PreparedExport { recovery, band }),

@@ -56,8 +56,8 @@ impl HoldoutValidation {
     ///
     /// # Errors
     /// If the executor is cancelled.
-    pub(super) fn new(
-        preparation: &RecoveryPreparationInput<impl Executor>,
+    pub(super) async fn new(
+        preparation: &RecoveryPreparationInput<'_, impl Executor>,
         basis: Option<&Basis>,
         recover_from_training: impl Fn(TileRect) -> FloatTile + Sync + Send,
     ) -> Result<Option<Self>, RecoverError> {
@@ -75,23 +75,45 @@ impl HoldoutValidation {
             return Ok(None);
         }
         let rects = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
-        let squares = executor.map(rects.len(), |i| ValidationRegion {
-            tile: recover_from_training(rects[i]),
-            measurements: prediction::samples(measurements, &split.held_out, rects[i]),
+        let own = executor.own_jobs(rects.len());
+        let squares = executor.map(own.len(), |i| {
+            let rect = rects[own.start + i];
+            let square = ValidationRegion {
+                tile: recover_from_training(rect),
+                measurements: prediction::samples(measurements, &split.held_out, rect),
+            };
+            let functions = square.tile.functions(&geometry, basis);
+            let residual = square.residual_variance(&geometry, &held_out, &functions);
+            let (signal, noise) = variances(measurements, split, rect);
+            (square, [signal, noise, residual])
         });
-        let functions = |i: usize| squares[i].tile.functions(&geometry, basis);
-        let recovered = executor.map(rects.len(), functions);
-        let variances = executor.map(rects.len(), |i| variances(measurements, split, rects[i]));
-        let mut validation = Self {
+        let square = |i: usize| &squares[i - own.start];
+        let variances = executor.all_gather(rects.len(), |i| vec![square(i).1]);
+        let variances = variances.await?.concat();
+        let [signal, noise, residual] =
+            [0, 1, 2].map(|i| variances.iter().map(|variances| variances[i]).sum());
+        let coefficients = |i: usize| square(i).0.tile.coefficients.clone();
+        let coefficients = executor.all_gather(rects.len(), coefficients).await?;
+        let functions = |i: usize| square(i).0.tile.functions.clone();
+        let functions = executor.all_gather(rects.len(), functions).await?;
+        let samples = |rect| prediction::samples(measurements, &split.held_out, rect);
+        let tiles = coefficients.into_iter().zip(functions).zip(&rects);
+        let squares = tiles.map(|((coefficients, functions), &rect)| ValidationRegion {
+            tile: FloatTile {
+                rect,
+                coefficients,
+                functions,
+            },
+            measurements: samples(rect),
+        });
+        Ok(Some(Self {
             geometry,
+            squares: squares.collect(),
+            signal,
+            noise,
+            residual,
             patterns: held_out,
-            squares,
-            signal: variances.iter().map(|(signal, _)| signal).sum(),
-            noise: variances.iter().map(|(_, noise)| noise).sum(),
-            residual: 0.0,
-        };
-        validation.residual = validation.residual_variance(&recovered);
-        Ok(Some(validation))
+        }))
     }
 
     /// Whether measurements vary between patterns by more than their noise.
@@ -128,18 +150,30 @@ impl HoldoutValidation {
     /// Variance of the residuals of `functions` between held-out patterns, summed over pixels and channels.
     fn residual_variance(&self, functions: &[TileTransportFunctions]) -> f64 {
         let squares = self.squares.iter().zip(functions);
-        let of_squares = squares.map(|(square, functions)| {
-            let predictions = prediction::predictions(&self.geometry, &self.patterns, functions);
-            let residuals = square.measurements.iter().zip(&predictions);
-            let residuals: Vec<f64> = residuals.map(|(y, predicted)| y - predicted).collect();
-            let pixels = residuals.chunks_exact(self.patterns.len() * CHANNELS);
-            let variances = pixels.flat_map(|residuals| {
-                let of_channel = |c| residuals.iter().skip(c).step_by(CHANNELS).copied();
-                (0..CHANNELS).filter_map(move |c| variance(of_channel(c)))
-            });
-            variances.sum::<f64>()
+        let variances = squares.map(|(square, functions)| {
+            square.residual_variance(&self.geometry, &self.patterns, functions)
         });
-        of_squares.sum()
+        variances.sum()
+    }
+}
+
+impl ValidationRegion {
+    /// Variance of the residuals of `functions` between held-out `patterns`, summed over pixels and channels.
+    fn residual_variance(
+        &self,
+        geometry: &Geometry,
+        patterns: &[Pattern],
+        functions: &TileTransportFunctions,
+    ) -> f64 {
+        let predictions = prediction::predictions(geometry, patterns, functions);
+        let residuals = self.measurements.iter().zip(&predictions);
+        let residuals: Vec<f64> = residuals.map(|(y, predicted)| y - predicted).collect();
+        let pixels = residuals.chunks_exact(patterns.len() * CHANNELS);
+        let variances = pixels.flat_map(|residuals| {
+            let of_channel = |c| residuals.iter().skip(c).step_by(CHANNELS).copied();
+            (0..CHANNELS).filter_map(move |c| variance(of_channel(c)))
+        });
+        variances.sum()
     }
 }
 
@@ -200,7 +234,7 @@ mod tests {
             executor: &SequentialExecutor,
         };
         let recover = |rect| FloatTile::from(cropped(&functions, rect));
-        HoldoutValidation::new(&preparation, None, recover).ok()?
+        pollster::block_on(HoldoutValidation::new(&preparation, None, recover)).ok()?
     }
 
     fn cropped(functions: &TileTransportFunctions, rect: TileRect) -> TileTransportFunctions {

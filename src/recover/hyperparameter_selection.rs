@@ -16,7 +16,7 @@ use super::pixelwise::{PixelSamples, PixelsByWindow, PixelwiseMethod, PixelwiseR
 use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, MIN_PATTERNS};
 use crate::capture::Measurements;
-use crate::job_executor::Executor;
+use crate::job_executor::{Cancelled, Executor};
 use crate::transport::{Decibels, SnrAccumulator, TileRect};
 
 /// Largest number of windows in a sample, and of pixels in each: enough to tell candidates apart by hundredths of a
@@ -31,8 +31,8 @@ impl PixelwiseRecovery {
     ///
     /// # Errors
     /// If no pixel in memory sees the light plane, and if the executor is cancelled.
-    pub fn least_squares(
-        preparation: &RecoveryPreparationInput<impl Executor>,
+    pub async fn least_squares(
+        preparation: &RecoveryPreparationInput<'_, impl Executor>,
     ) -> Result<Self, RecoverError> {
         preparation.executor.check_cancelled()?;
         let sample = sample_windows(preparation, LEAST_SQUARES_SAMPLE)?;
@@ -41,27 +41,27 @@ impl PixelwiseRecovery {
             common_mode,
             problem: PixelwiseMethod::LeastSquares,
         });
-        Ok(best_of(candidates, preparation, &sample))
+        Ok(best_of(candidates, preparation, &sample).await?)
     }
 
     /// Basis pursuit denoising, with the best weight of the common mode and the best tolerance.
     ///
     /// # Errors
     /// If no pixel in memory sees the light plane, and if the executor is cancelled.
-    pub fn denoising(
-        preparation: &RecoveryPreparationInput<impl Executor>,
+    pub async fn denoising(
+        preparation: &RecoveryPreparationInput<'_, impl Executor>,
         basis: SparsityBasis,
     ) -> Result<Self, RecoverError> {
-        let least_squares = Self::least_squares(preparation)?;
+        let least_squares = Self::least_squares(preparation).await?;
         let sample = sample_windows(preparation, LEAST_SQUARES_SAMPLE)?;
-        let noise = least_squares.fit_noise(preparation, &sample);
+        let noise = least_squares.fit_noise(preparation, &sample).await?;
         preparation.executor.check_cancelled()?;
         let sample = sample_windows(preparation, DENOISING_SAMPLE)?;
         let candidates = ResidualTolerance::CANDIDATE_SHARES.map(|share| Self {
             problem: PixelwiseMethod::Denoising(basis, ResidualTolerance { share, ..noise }),
             ..least_squares
         });
-        Ok(best_of(candidates, preparation, &sample))
+        Ok(best_of(candidates, preparation, &sample).await?)
     }
 
     /// Error of the predictions of one window's measurements under the held-out patterns.
@@ -88,13 +88,13 @@ impl PixelwiseRecovery {
     }
 
     /// The noise of the measurements, by the residuals of least squares and the degrees of freedom that it leaves.
-    fn fit_noise(
+    async fn fit_noise(
         &self,
-        preparation: &RecoveryPreparationInput<impl Executor>,
+        preparation: &RecoveryPreparationInput<'_, impl Executor>,
         sample: &[PixelsByWindow],
-    ) -> ResidualTolerance {
+    ) -> Result<ResidualTolerance, Cancelled> {
         let (measurements, all) = (preparation.measurements, &preparation.split.all);
-        let pairs = preparation.executor.map(sample.len(), |i| {
+        let pairs_of_window = |i: usize| {
             let mut pairs = Vec::new();
             let mut add = |equations: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
                 let sample = |&l: &usize| measurements.sample(l, samples.pixel, samples.channel);
@@ -103,19 +103,21 @@ impl PixelwiseRecovery {
                 if count >= MIN_PATTERNS && residual_freedom >= 1.0 {
                     let y = equations.weight(&samples.y);
                     let residual = equations.columns.squared_residual(&y, x);
-                    pairs.push((sampling::mean(&samples.y), residual / residual_freedom));
+                    pairs.push([sampling::mean(&samples.y), residual / residual_freedom]);
                 }
             };
             self.solve_windows(measurements, from_ref(&sample[i]), all, &mut add);
             pairs
-        });
-        ResidualTolerance::fit(&pairs.concat())
+        };
+        let executor = preparation.executor;
+        let pairs = executor.all_gather(sample.len(), pairs_of_window).await?;
+        Ok(ResidualTolerance::fit(&pairs.concat()))
     }
 }
 
 /// Windows spread over the picture, with some of their pixels.
 fn sample_windows(
-    preparation: &RecoveryPreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
     [max_windows, max_pixels]: [usize; 2],
 ) -> Result<Vec<PixelsByWindow>, RecoverError> {
     let geometry = &preparation.geometry;
@@ -137,19 +139,24 @@ fn sample_windows(
 }
 
 /// The candidate that predicts the held-out patterns of the sample best; the first if no pattern is held out.
-fn best_of<const N: usize>(
+async fn best_of<const N: usize>(
     candidates: [PixelwiseRecovery; N],
-    preparation: &RecoveryPreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
     sample: &[PixelsByWindow],
-) -> PixelwiseRecovery {
+) -> Result<PixelwiseRecovery, Cancelled> {
     let (measurements, split) = (preparation.measurements, preparation.split);
     let mut best = candidates[0];
     if split.held_out.is_empty() {
-        return best;
+        return Ok(best);
     }
-    let errors = preparation.executor.map(sample.len(), |i| {
-        candidates.map(|candidate| candidate.prediction_error(measurements, split, &sample[i]))
-    });
+    let errors = |i: usize| {
+        let error = |candidate: &PixelwiseRecovery| {
+            candidate.prediction_error(measurements, split, &sample[i])
+        };
+        candidates.iter().map(error).collect::<Vec<_>>()
+    };
+    let executor = preparation.executor;
+    let errors = executor.all_gather(sample.len(), errors).await?;
     let mut best_snr: Option<Decibels> = None;
     for (n, candidate) in candidates.into_iter().enumerate() {
         let error: SnrAccumulator = errors.iter().map(|errors| errors[n]).sum();
@@ -159,5 +166,5 @@ fn best_of<const N: usize>(
             (best_snr, best) = (Some(snr), candidate);
         }
     }
-    best
+    Ok(best)
 }

@@ -15,15 +15,13 @@ use super::pattern_check;
 use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::Measurements;
-use crate::job_executor::Executor;
+use crate::job_executor::{Cancelled, Executor, PARTS};
 use crate::linalg::{add_scaled, vectorise};
 use crate::transport::{CHANNELS, LightElement, TileRect, Window};
 
 /// Rounds of brightness and function. A brightness that is a few per cent off, as it is while the function is unknown,
 /// shows as light from far off.
 const ROUNDS: usize = 3;
-/// Jobs that the sums are divided into. Fixed, so that rounding does not depend on the number of threads.
-const JOBS: usize = 8;
 /// Standard deviation of a pixel's measurements from those that the mean function predicts, relative to its brightness;
 /// what limits a pixel's certainty where noise is low.
 const MODEL_DEVIATION: f64 = 0.1;
@@ -36,7 +34,7 @@ pub(super) const MAX_SAMPLES: usize = MAX_SQUARES * (SQUARE_SIDE * SQUARE_SIDE) 
 
 /// Upper bound on the memory that [`mean_function`] takes, in bytes.
 pub(super) fn max_bytes(window: Window) -> usize {
-    (JOBS + 2) * window.area() * window.area() * size_of::<f64>()
+    (PARTS + 2) * window.area() * window.area() * size_of::<f64>()
 }
 
 pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
@@ -48,15 +46,15 @@ pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
 ///
 /// # Errors
 /// If the photographs are dark or overexposed, if they do not match their patterns, and if the executor is cancelled.
-pub(super) fn mean_function(
-    preparation: &RecoveryPreparationInput<impl Executor>,
+pub(super) async fn mean_function(
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
 ) -> Result<Vec<f64>, RecoverError> {
     let squares = sample_squares(preparation.measurements);
     let area = preparation.geometry.window.area();
     let mut mean = vec![1.0 / area as f64; area];
     for _ in 0..ROUNDS {
         preparation.executor.check_cancelled()?;
-        let function = fit_round(preparation, &squares, &mean);
+        let function = fit_round(preparation, &squares, &mean).await?;
         let sum: f64 = function.iter().sum();
         if sum.is_nan() || sum <= 0.0 {
             return Err(dark_or_overexposed(preparation.measurements, &squares));
@@ -64,16 +62,16 @@ pub(super) fn mean_function(
         mean = function.iter().map(|m| m / sum).collect();
     }
     preparation.executor.check_cancelled()?;
-    pattern_check::check_patterns(preparation, &mean, &squares)?;
+    pattern_check::check_patterns(preparation, &mean, &squares).await?;
     Ok(mean)
 }
 
 /// Estimates every pixel's brightness with the function `mean`, then the function of all pixels, `[slot]`.
-fn fit_round(
-    preparation: &RecoveryPreparationInput<impl Executor>,
+async fn fit_round(
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
     squares: &[TileRect],
     mean: &[f64],
-) -> Vec<f64> {
+) -> Result<Vec<f64>, Cancelled> {
     let geometry = &preparation.geometry;
     let area = geometry.window.area();
     let is_whole = |origin: LightElement| geometry.clip_window(origin).area() == area;
@@ -84,31 +82,30 @@ fn fit_round(
     // Windows across the border say little of the elements off the light plane: they are left out if there are enough
     // others.
     let only_whole = 4 * whole_squares.count() >= squares.len();
-    let jobs = preparation.executor.map(JOBS, |job| {
-        let mut sums = NormalEquations::zeros(area);
-        for square in squares.iter().skip(job).step_by(JOBS) {
+    let add_part = |part: usize, sums: &mut NormalEquations| {
+        for square in squares.iter().skip(part).step_by(PARTS) {
             for (origin, pixels) in sampling::pixels_by_window(geometry, *square) {
                 if only_whole && !is_whole(origin) {
                     continue;
                 }
                 vectorise(
                     #[cfg_attr(target_arch = "x86_64", inline(always))]
-                    || add_window(&mut sums, preparation, mean, origin, &pixels),
+                    || add_window(sums, preparation, mean, origin, &pixels),
                 );
             }
         }
-        sums
-    });
-    let mut total = NormalEquations::zeros(area);
-    jobs.iter().for_each(|sums| total.merge(sums));
+    };
+    let executor = preparation.executor;
+    let total = executor.all_reduce(|| NormalEquations::zeros(area), add_part);
+    let total = total.await?;
     let (gram, right) = total.into_parts();
-    Nnls::new(&gram, area).solve(&right)
+    Ok(Nnls::new(&gram, area).solve(&right))
 }
 
 #[cfg_attr(target_arch = "x86_64", inline(always))]
 fn add_window(
     sums: &mut NormalEquations,
-    preparation: &RecoveryPreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
     mean: &[f64],
     origin: LightElement,
     pixels: &PixelsSharingWindow,
@@ -201,12 +198,12 @@ mod tests {
     use crate::job_executor::SequentialExecutor;
 
     fn fit(capture: &SyntheticCapture) -> Result<Vec<f64>, RecoverError> {
-        mean_function(&RecoveryPreparationInput {
+        pollster::block_on(mean_function(&RecoveryPreparationInput {
             measurements: &capture.measurements,
             geometry: capture.geometry,
             split: &HoldoutSplit::new(&capture.measurements.patterns),
             executor: &SequentialExecutor,
-        })
+        }))
     }
 
     #[test]

@@ -10,7 +10,8 @@
 //! makes recovery fast. The weight of the patterns' common mode ([`CommonModeWeight`]) makes it accurate. Parameters
 //! are chosen on held-out patterns, which also estimate the SNR ([`HoldoutValidation`]).
 //!
-//! [`PreparedRecovery`] has no threads and no files: an [`Executor`](crate::job_executor::Executor) runs its jobs.
+//! [`PreparedRecovery`] has no threads and no files: an [`Executor`](crate::job_executor::Executor) runs its jobs. What
+//! is `async` waits only for other processes of the executor's group.
 
 mod bpdn;
 mod common_mode_weight;
@@ -24,6 +25,7 @@ mod mean_function;
 mod method;
 mod nnls;
 mod normal_equations;
+mod partition;
 mod passive_set;
 mod pattern_check;
 mod pixelwise;

@@ -6,6 +6,7 @@
 //! right-hand side and residual are plain inner products.
 
 use super::common_mode_weight::CommonModeWeight;
+use crate::job_executor::Sums;
 use crate::linalg::{self, add_scaled, dot};
 
 /// `W`.
@@ -173,11 +174,6 @@ impl NormalEquations {
         }
     }
 
-    pub fn merge(&mut self, other: &Self) {
-        add_scaled(&mut self.gram, 1.0, &other.gram);
-        add_scaled(&mut self.right, 1.0, &other.right);
-    }
-
     /// The Gram matrix with both triangles, and the right-hand side.
     pub fn into_parts(mut self) -> (Vec<f64>, Vec<f64>) {
         linalg::mirror_upper(&mut self.gram, self.right.len());
@@ -192,9 +188,17 @@ impl NormalEquations {
     }
 }
 
+impl Sums for NormalEquations {
+    fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64])) {
+        visitor(&mut self.gram);
+        visitor(&mut self.right);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::job_executor::add;
 
     /// A `[L, k]` by its transpose, `w` and `y`.
     const PATTERNS: usize = 5;
@@ -263,7 +267,7 @@ mod tests {
         let mut other = NormalEquations::zeros(3);
         let twice: Vec<f64> = y.iter().map(|y| 2.0 * y).collect();
         other.add(&columns, &[1, 2], 2.0, &twice);
-        sums.merge(&other);
+        add(&mut sums, &mut other);
         let x = sums.clone().solve().unwrap();
         let (gram, right) = sums.into_parts();
         for i in 0..3 {

@@ -6,6 +6,8 @@
 //! of the picture (clusters, as in Liang and Zeger 1986). A photograph fails only if its slope is too small with
 //! certainty.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::error::RecoverError;
 use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, PixelsSharingWindow};
@@ -28,9 +30,10 @@ const MIN_HELD_OUT: usize = 2;
 ///
 /// # Errors
 /// [`RecoverError::MismatchedPatterns`] if some photographs do not match their patterns, and
-/// [`RecoverError::UncorrelatedPatterns`] if most do not, or if the held-out patterns together predict nothing.
-pub(super) fn check_patterns(
-    preparation: &RecoveryPreparationInput<impl Executor>,
+/// [`RecoverError::UncorrelatedPatterns`] if most do not, or if the held-out patterns together predict nothing;
+/// [`RecoverError::Cancelled`].
+pub(super) async fn check_patterns(
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
     mean_function: &[f64],
     squares: &[TileRect],
 ) -> Result<(), RecoverError> {
@@ -38,13 +41,15 @@ pub(super) fn check_patterns(
         return Ok(());
     }
     let split = preparation.split;
-    let moments = preparation.executor.map(squares.len(), |i| {
+    let square_moments = |i: usize| {
         let mut moments = vec![SlopeMoments::default(); split.all.len()];
         for (origin, pixels) in sampling::pixels_by_window(&preparation.geometry, squares[i]) {
             add_window(&mut moments, preparation, mean_function, origin, &pixels);
         }
         moments
-    });
+    };
+    let executor = preparation.executor;
+    let moments = executor.all_gather(squares.len(), square_moments).await?;
     let slope = |&l: &usize| SlopeEstimate::fit(&moments, &[l]);
     let slopes: Vec<Option<SlopeEstimate>> = split.all.iter().map(slope).collect();
     let mut values: Vec<f64> = slopes.iter().flatten().map(|slope| slope.value).collect();
@@ -68,7 +73,8 @@ pub(super) fn check_patterns(
 }
 
 /// Sums over pixels, both centred over the patterns: of squared predictions, and of predictions times measurements.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
 struct SlopeMoments {
     prediction: f64,
     cross: f64,
@@ -114,7 +120,7 @@ impl SlopeEstimate {
 
 fn add_window(
     moments: &mut [SlopeMoments],
-    preparation: &RecoveryPreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
     mean_function: &[f64],
     origin: LightElement,
     pixels: &PixelsSharingWindow,

@@ -51,7 +51,7 @@ impl PreparedRecovery {
     /// # Errors
     /// If there are too few patterns, if the geometry is out of range or no pixel sees the light plane, if the
     /// photographs are dark, overexposed or do not match their patterns, and if the executor is cancelled.
-    pub fn prepare(
+    pub async fn prepare(
         measurements: &Measurements,
         settings: RecoverySettings,
         executor: &impl Executor,
@@ -69,14 +69,16 @@ impl PreparedRecovery {
             executor,
         };
         // Also checks that the photographs match their patterns, for every method.
-        let mean = mean_function::mean_function(&preparation)?;
+        let mean = mean_function::mean_function(&preparation).await?;
         let solver = match settings.method {
             Method::Learned => {
-                TileSolver::Learned(Box::new(LearnedRecovery::new(&preparation, &mean)?))
+                TileSolver::Learned(Box::new(LearnedRecovery::new(&preparation, &mean).await?))
             }
-            Method::Nnls => TileSolver::Pixelwise(PixelwiseRecovery::least_squares(&preparation)?),
+            Method::Nnls => {
+                TileSolver::Pixelwise(PixelwiseRecovery::least_squares(&preparation).await?)
+            }
             Method::Bpdn(basis) => {
-                TileSolver::Pixelwise(PixelwiseRecovery::denoising(&preparation, basis)?)
+                TileSolver::Pixelwise(PixelwiseRecovery::denoising(&preparation, basis).await?)
             }
         };
         let mut recovery = Self {
@@ -92,7 +94,7 @@ impl PreparedRecovery {
             }
         };
         recovery.holdout_validation =
-            HoldoutValidation::new(&preparation, recovery.basis(), training_tile)?;
+            HoldoutValidation::new(&preparation, recovery.basis(), training_tile).await?;
         Ok(recovery)
     }
 

@@ -18,7 +18,7 @@ use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns}
 use super::preparation_input;
 use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::{Measurements, group_count};
-use crate::job_executor::Executor;
+use crate::job_executor::{Executor, PARTS, set_values, values};
 use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::{Geometry, LightElement, Window};
 
@@ -37,8 +37,6 @@ const MARGIN_RINGS: usize = 1;
 /// Squares of the picture that are used, and their side in camera pixels.
 const MAX_SQUARES: usize = 1024;
 const SQUARE_SIDE: u32 = 4;
-/// Parts of the picture for the jackknife, one job each.
-const PARTS: usize = 8;
 
 /// A window for the recovery, as estimated from measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +72,7 @@ impl WindowSizeEstimate {
     ///
     /// # Errors
     /// If the geometry is out of range, if no pixel sees the light plane, and if the executor is cancelled.
-    pub fn from_measurements(
+    pub async fn from_measurements(
         measurements: &Measurements,
         executor: &impl Executor,
     ) -> Result<Self, RecoverError> {
@@ -86,7 +84,8 @@ impl WindowSizeEstimate {
         // Errors of neighbouring squares are correlated: each part is a strip of the picture.
         squares.sort_by_key(|square| (square.y, square.x));
         executor.check_cancelled()?;
-        let parts = executor.map(PARTS, |part| {
+        // A part of the picture for each job, and for the jackknife.
+        let sum_part = |part: usize| {
             let mut sums = NormalEquations::zeros(rings.count());
             let start = |part: usize| part * squares.len() / PARTS;
             for square in &squares[start(part)..start(part + 1)] {
@@ -97,12 +96,15 @@ impl WindowSizeEstimate {
                     );
                 }
             }
-            sums
-        });
+            values(&mut sums)
+        };
+        let parts = executor.all_gather(PARTS, sum_part).await?;
         let tail_fractions_without = |left_out: usize| {
             let mut total = NormalEquations::zeros(rings.count());
+            let mut sums = values(&mut total);
             let used = (0..PARTS).filter(|&part| part != left_out);
-            used.for_each(|part| total.merge(&parts[part]));
+            used.for_each(|part| add_scaled(&mut sums, 1.0, &parts[part]));
+            set_values(&mut total, &sums);
             Some(rings.tail_fractions(&total.solve()?, max_side))
         };
         // None from too few measurements, or from dark photographs, which the recovery reports.

@@ -64,7 +64,8 @@ pub(super) fn measure_accuracy(
         method,
         window: known.geometry().window,
     };
-    let recovery = PreparedRecovery::prepare(measurements, settings, executor)?;
+    let preparation = PreparedRecovery::prepare(measurements, settings, executor);
+    let recovery = pollster::block_on(preparation)?;
     let prepared = start.elapsed().as_secs_f64();
     let geometry = *recovery.geometry();
     let rects = sample_for(method, &geometry, pixels);

@@ -154,7 +154,8 @@ fn pictures(
         method: DEFAULT_METHOD,
         window: known.geometry().window,
     };
-    let recovery = PreparedRecovery::prepare(measurements, settings, executor)?;
+    let preparation = PreparedRecovery::prepare(measurements, settings, executor);
+    let recovery = pollster::block_on(preparation)?;
     let geometry = *recovery.geometry();
     let basis = recovery.basis().cloned().unwrap_or_default();
     let area = geometry.window.area();

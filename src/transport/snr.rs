@@ -3,6 +3,8 @@
 use std::fmt;
 use std::iter::Sum;
 
+use bytemuck::{Pod, Zeroable};
+
 /// A ratio in decibels: 20 log10 of a ratio of amplitudes.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Serialize)]
 #[serde(transparent)]
@@ -16,7 +18,8 @@ impl fmt::Display for Decibels {
 
 /// Sums of squares for SNR(T, T̂) = 20 log10(‖T‖_F / ‖T − T̂‖_F) (paper, section 4) over all entries of both matrices,
 /// in any order.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
 pub struct SnrAccumulator {
     /// Of the true values.
     pub signal: f64,

@@ -28,6 +28,16 @@ impl ReportingExecutor {
     }
 }
 
+#[cfg(feature = "recovery")]
+/// Awaits `work`, whose executor counts its jobs by [`report_job`].
+pub async fn report_jobs_of<R>(callback: &Function, work: impl Future<Output = R>) -> R {
+    CALLBACK.set(Some(callback.clone()));
+    JOBS_DONE.set(0);
+    let result = work.await;
+    CALLBACK.set(None);
+    result
+}
+
 impl Executor for ReportingExecutor {
     fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         let run = |i| {

@@ -110,7 +110,8 @@ impl RecoverJob<'_> {
     fn prepare(&self, measurements: &Measurements) -> Result<PreparedExport> {
         let spinner = progress::spinner("learning");
         let (method, window) = (self.args.method(), self.args.window);
-        let prepared = export::prepare(measurements, method, window, self.cores);
+        let preparation = export::prepare(measurements, method, window, self.cores);
+        let prepared = pollster::block_on(preparation);
         drop(spinner);
         let prepared = prepared.map_err(|error| self.recover_error(error))?;
         messages::warn_of_preparation(&prepared);

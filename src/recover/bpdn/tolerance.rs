@@ -38,8 +38,8 @@ impl ResidualTolerance {
 
     /// Fits gain and floor, both at least zero, to pairs of mean and variance by least squares relative to
     /// the expected variance: the uncertainty of a variance is proportional to it.
-    pub fn fit(pairs: &[(f64, f64)]) -> Self {
-        let (levels, variances): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+    pub fn fit(pairs: &[[f64; 2]]) -> Self {
+        let (levels, variances): (Vec<f64>, Vec<f64>) = pairs.iter().map(|&[x, y]| (x, y)).unzip();
         let (level, variance) = (mean(&levels), mean(&variances));
         let mut fit = Self {
             gain: 0.0,
@@ -49,7 +49,7 @@ impl ResidualTolerance {
         // The weights depend on the fit.
         for _ in 0..REWEIGHTINGS {
             let [mut w, mut wx, mut wxx, mut wy, mut wxy] = [0.0; 5];
-            for &(x, y) in pairs {
+            for &[x, y] in pairs {
                 let expected =
                     (fit.gain * x + fit.floor).max(MIN_EXPECTED_VARIANCE_SHARE * variance);
                 let weight = 1.0 / (expected * expected).max(f64::MIN_POSITIVE);
@@ -85,7 +85,7 @@ mod tests {
     fn fit_recovers_gain_and_floor() {
         let pairs: Vec<_> = (1..50)
             .map(|i| f64::from(i) / 50.0)
-            .map(|x| (x, 0.02 * x + 0.003))
+            .map(|x| [x, 0.02 * x + 0.003])
             .collect();
         let fit = ResidualTolerance::fit(&pairs);
         assert!((fit.gain - 0.02).abs() < 1e-9 && (fit.floor - 0.003).abs() < 1e-9);
@@ -95,13 +95,13 @@ mod tests {
 
     #[test]
     fn gain_and_floor_are_not_negative() {
-        let falling: Vec<_> = (0..9).map(|i| (f64::from(i), 9.0 - f64::from(i))).collect();
+        let falling: Vec<_> = (0..9).map(|i| [f64::from(i), 9.0 - f64::from(i)]).collect();
         let fit = ResidualTolerance::fit(&falling);
         assert!(fit.gain == 0.0 && fit.floor > 0.0);
-        let steep: Vec<_> = (1..9).map(|i| (f64::from(i), f64::from(i) - 0.5)).collect();
+        let steep: Vec<_> = (1..9).map(|i| [f64::from(i), f64::from(i) - 0.5]).collect();
         let fit = ResidualTolerance::fit(&steep);
         assert!(fit.gain > 0.0 && fit.floor == 0.0);
-        let one = ResidualTolerance::fit(&[(0.5, 0.1)]);
+        let one = ResidualTolerance::fit(&[[0.5, 0.1]]);
         assert!((one.epsilon(&[0.5]) - 0.1f64.sqrt()).abs() < 1e-9);
         assert_eq!(ResidualTolerance::fit(&[]).epsilon(&[1.0; 10]), 0.0);
     }

@@ -175,15 +175,18 @@ impl ObservationEquations {
     }
 }
 
-/// The brightness below which observations are not reliable: by channel, a share of what the brightest 5 % of
-/// the observations in `regions` exceed.
-pub(super) fn min_reliable_brightness(regions: &[ObservationEquations]) -> MinReliableBrightness {
+/// The brightness below which observations with these `brightnesses`, `[pixel, channel]`, are not reliable: by channel, a
+/// share of what the brightest 5 % exceed.
+pub(super) fn min_reliable_brightness(brightnesses: &[f64]) -> MinReliableBrightness {
     std::array::from_fn(|c| {
-        let observations = regions.iter().flat_map(|region| &region.observations);
-        let of_channel = observations.skip(c).step_by(CHANNELS);
-        let mut brightnesses: Vec<f64> = of_channel.map(|o| o.brightness).collect();
-        brightnesses.sort_by(f64::total_cmp);
-        let bright = brightnesses.get(brightnesses.len() * BRIGHT_PERCENTILE / 100);
+        let mut of_channel: Vec<f64> = brightnesses
+            .iter()
+            .skip(c)
+            .step_by(CHANNELS)
+            .copied()
+            .collect();
+        of_channel.sort_by(f64::total_cmp);
+        let bright = of_channel.get(of_channel.len() * BRIGHT_PERCENTILE / 100);
         MIN_RELATIVE_BRIGHTNESS * bright.copied().unwrap_or(0.0)
     })
 }

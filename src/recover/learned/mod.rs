@@ -32,6 +32,7 @@ mod prior;
 #[cfg(test)]
 mod tests;
 mod training;
+mod training_equations;
 
 use serde::{Deserialize, Serialize};
 
@@ -71,24 +72,27 @@ impl LearnedRecovery {
     /// # Errors
     /// [`RecoverError::NoSignal`] where no prior can be learned, [`RecoverError::Cancelled`] after cancellation, and the
     /// errors of [`PixelwiseRecovery::least_squares`].
-    pub fn new(
-        preparation: &RecoveryPreparationInput<impl Executor>,
+    pub async fn new(
+        preparation: &RecoveryPreparationInput<'_, impl Executor>,
         mean_function: &[f64],
     ) -> Result<Self, RecoverError> {
         let (split, executor) = (preparation.split, preparation.executor);
-        let mut model = preparation.fit_basis(mean_function)?;
+        let mut model = preparation.fit_basis(mean_function).await?;
         executor.check_cancelled()?;
-        let regions = preparation.training_regions(model.basis.rank());
-        preparation.fit_priors(&mut model, &split.training, &regions, true);
+        let regions = preparation.training_regions(model.basis.rank()).await?;
+        let training = preparation.fit_priors(&mut model, &split.training, &regions, true);
+        training.await?;
         let mut nnls = None;
         if !split.held_out.is_empty() {
-            preparation.select_neighbour_prior(&mut model, &regions);
+            let selection = preparation.select_neighbour_prior(&mut model, &regions);
+            selection.await?;
             executor.check_cancelled()?;
-            nnls = fit_nnls_alternative(&model, preparation, &regions)?;
+            nnls = fit_nnls_alternative(&model, preparation, &regions).await?;
             // All choices are made: train on the held-out patterns, too.
             executor.check_cancelled()?;
             let helps = model.neighbour_prior.is_some();
-            preparation.fit_priors(&mut model, &split.all, &regions, helps);
+            let training = preparation.fit_priors(&mut model, &split.all, &regions, helps);
+            training.await?;
         }
         Ok(Self { model, nnls })
     }

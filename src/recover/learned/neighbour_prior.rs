@@ -21,6 +21,8 @@
 //!
 //! [`neighbour_regression`]: super::neighbour_regression
 
+use std::slice::from_mut;
+
 use serde::{Deserialize, Serialize};
 
 use super::equations::PHASES;
@@ -28,15 +30,14 @@ use super::neighbour_regression::{RegressionSums, add_products, solve_regression
 use super::posterior::{PosteriorSolver, PriorPrecision, SecondMoment};
 use super::posterior_means::{PREDICTORS, PixelObservationPosition, PosteriorMeans};
 use super::prior::Prior;
-use crate::job_executor::Executor;
+use crate::job_executor::{Cancelled, Executor, Sums};
 use crate::linalg::{self, add_scaled, vectorise};
+use crate::recover::partition::Partition;
 use crate::transport::CHANNELS;
 
 /// EM iterations from the first estimate, and from a prior that was learned from most of the same measurements.
 const EM_ITERATIONS: usize = 3;
 const EM_ITERATIONS_WARM: usize = 2;
-/// Groups of regions that sums are formed over. Fixed, so that results do not depend on the executor.
-const PARTS: usize = 8;
 /// Share of the pixel posterior's variance in the first estimate of C, and the observations, one in so many, whose
 /// posterior variance is computed for it.
 const POSTERIOR_VARIANCE_SHARE: f64 = 0.5;
@@ -79,16 +80,18 @@ struct NeighbourStatistics {
 impl NeighbourPrior {
     /// Learns from the bright observations in the interiors of `regions`, starting from `start` if there is one; `None`
     /// if they are too few.
-    pub fn learn(
-        regions: &[PosteriorMeans<'_>],
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub async fn learn(
+        regions: &Partition<PosteriorMeans<'_>>,
         prior: &Prior,
         start: Option<Self>,
         executor: &impl Executor,
-    ) -> Option<Self> {
+    ) -> Result<Option<Self>, Cancelled> {
         let rank = prior.rank;
-        let parts = executor.map(PARTS, |part| {
-            let mut sums = vec![RegressionSums::new(rank); CLASSES];
-            for region in regions.iter().skip(part).step_by(PARTS) {
+        let add_part = |part: usize, sums: &mut Vec<RegressionSums>| {
+            for region in regions.part(part) {
                 vectorise(
                     #[inline(always)]
                     || {
@@ -99,16 +102,12 @@ impl NeighbourPrior {
                     },
                 );
             }
-            sums
-        });
-        let sums = parts.into_iter().reduce(|mut sums, part| {
-            let pairs = sums.iter_mut().zip(&part);
-            pairs.for_each(|(sum, part)| sum.merge(part));
-            sums
-        })?;
+        };
+        let sums = executor.all_reduce(|| vec![RegressionSums::new(rank); CLASSES], add_part);
+        let sums = sums.await?;
         let count: f64 = sums.iter().map(RegressionSums::count).sum();
         if count < (MIN_OBSERVATIONS_PER_WEIGHT * PREDICTORS * CLASSES) as f64 {
-            return None;
+            return Ok(None);
         }
         let factors = executor.map(CLASSES, |i| sums[i].cholesky_factors());
         let solve = |right_hand_sides: &[Vec<f64>]| {
@@ -125,12 +124,13 @@ impl NeighbourPrior {
                     precision: prior.precision.clone(),
                     mixing_share: 0.5,
                 };
-                first.precision = first.initial_precision(regions, prior);
+                first.precision = first.initial_precision(regions, prior, executor).await?;
                 (first, EM_ITERATIONS)
             }
         };
         for _ in 0..iterations {
-            let statistics = learned.expectation(regions, prior.noise_factor, executor);
+            let expectation = learned.expectation(regions, prior.noise_factor, executor);
+            let statistics = expectation.await?;
             let [low, high] = MIXING_SHARE_RANGE;
             let share = statistics.responsibility / statistics.count.max(1.0);
             learned.mixing_share = share.clamp(low, high);
@@ -141,46 +141,69 @@ impl NeighbourPrior {
             learned.precision = PriorPrecision::new(&covariance, rank);
             learned.weights = solve(&statistics.right_hand_sides);
         }
-        Some(learned)
+        Ok(Some(learned))
     }
 
     /// The first estimate of C⁻¹: from the prediction errors of the posterior means, and part of the variance that these
     /// means have themselves.
-    fn initial_precision(&self, regions: &[PosteriorMeans<'_>], prior: &Prior) -> PriorPrecision {
+    async fn initial_precision(
+        &self,
+        regions: &Partition<PosteriorMeans<'_>>,
+        prior: &Prior,
+        executor: &impl Executor,
+    ) -> Result<PriorPrecision, Cancelled> {
         let rank = self.rank;
-        let mut covariance = vec![0.0; rank * rank];
-        let mut variance = vec![0.0; rank];
-        let (mut count, mut sampled) = (0.0, 0.0);
-        let mut solver = PosteriorSolver::new(rank);
-        for region in regions {
-            for (i, location) in region.interior_locations().enumerate() {
-                let index = location.index;
-                if !region.is_reliable[index] {
-                    continue;
-                }
-                let mean = self.predict(region, location);
-                let errors = region.mean(index).iter().zip(mean);
-                let error: Vec<f64> = errors.map(|(z, m)| z - m).collect();
-                for (row, k) in covariance.chunks_exact_mut(rank).zip(0..) {
-                    add_scaled(&mut row[k..], error[k], &error[k..]);
-                }
-                count += 1.0;
-                if i % VARIANCE_SAMPLING == 0 {
-                    prior.infer(region.equations, index, &mut solver);
-                    solver.compute_covariance();
-                    (0..rank).for_each(|k| variance[k] += solver.covariance[k * rank + k]);
-                    sampled += 1.0;
-                }
+        let add_part = |part: usize, sums: &mut PredictionErrors| {
+            let mut solver = PosteriorSolver::new(rank);
+            for region in regions.part(part) {
+                vectorise(
+                    #[inline(always)]
+                    || self.add_prediction_errors(region, prior, &mut solver, sums),
+                );
             }
-        }
-        let count = f64::max(count, 1.0);
-        covariance.iter_mut().for_each(|c| *c /= count);
+        };
+        let sums = executor.all_reduce(|| PredictionErrors::new(rank), add_part);
+        let sums = sums.await?;
+        let mut covariance = sums.outer;
+        covariance
+            .iter_mut()
+            .for_each(|c| *c /= sums.count.max(1.0));
         for k in 0..rank {
-            let mean_variance = variance[k] / f64::max(sampled, 1.0);
+            let mean_variance = sums.variance[k] / sums.sampled.max(1.0);
             covariance[k * rank + k] += POSTERIOR_VARIANCE_SHARE * mean_variance;
         }
         linalg::mirror_upper(&mut covariance, rank);
-        PriorPrecision::new(&covariance, rank)
+        Ok(PriorPrecision::new(&covariance, rank))
+    }
+
+    #[inline(always)]
+    fn add_prediction_errors(
+        &self,
+        region: &PosteriorMeans<'_>,
+        prior: &Prior,
+        solver: &mut PosteriorSolver,
+        sums: &mut PredictionErrors,
+    ) {
+        let rank = self.rank;
+        for (i, location) in region.interior_locations().enumerate() {
+            let index = location.index;
+            if !region.is_reliable[index] {
+                continue;
+            }
+            let mean = self.predict(region, location);
+            let errors = region.mean(index).iter().zip(mean);
+            let error: Vec<f64> = errors.map(|(z, m)| z - m).collect();
+            for (row, k) in sums.outer.chunks_exact_mut(rank).zip(0..) {
+                add_scaled(&mut row[k..], error[k], &error[k..]);
+            }
+            sums.count += 1.0;
+            if i % VARIANCE_SAMPLING == 0 {
+                prior.infer(region.equations, index, solver);
+                solver.compute_covariance();
+                (0..rank).for_each(|k| sums.variance[k] += solver.covariance[k * rank + k]);
+                sums.sampled += 1.0;
+            }
+        }
     }
 
     /// m, the prediction of an observation from its neighbours.
@@ -212,25 +235,22 @@ impl NeighbourPrior {
         (1.0 / (1.0 + libm::exp(-log_odds)), mean)
     }
 
-    fn expectation(
+    async fn expectation(
         &self,
-        regions: &[PosteriorMeans<'_>],
+        regions: &Partition<PosteriorMeans<'_>>,
         noise: f64,
         executor: &impl Executor,
-    ) -> NeighbourStatistics {
-        let parts = executor.map(PARTS, |part| {
-            let mut sums = NeighbourStatistics::new(self.rank);
-            for region in regions.iter().skip(part).step_by(PARTS) {
+    ) -> Result<NeighbourStatistics, Cancelled> {
+        let add_part = |part: usize, sums: &mut NeighbourStatistics| {
+            for region in regions.part(part) {
                 vectorise(
                     #[inline(always)]
-                    || self.add_region(region, noise, &mut sums),
+                    || self.add_region(region, noise, sums),
                 );
             }
-            sums
-        });
-        let mut total = NeighbourStatistics::new(self.rank);
-        parts.iter().for_each(|part| total.merge(part));
-        total
+        };
+        let zeros = || NeighbourStatistics::new(self.rank);
+        executor.all_reduce(zeros, add_part).await
     }
 
     #[inline(always)]
@@ -261,15 +281,47 @@ impl NeighbourStatistics {
             count: 0.0,
         }
     }
+}
 
-    fn merge(&mut self, other: &Self) {
-        let sides = self.right_hand_sides.iter_mut();
-        for (sum, other) in sides.zip(&other.right_hand_sides) {
-            add_scaled(sum, 1.0, other);
+impl Sums for NeighbourStatistics {
+    fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64])) {
+        self.right_hand_sides
+            .iter_mut()
+            .for_each(|side| visitor(side));
+        self.second_moment.visit(visitor);
+        visitor(from_mut(&mut self.responsibility));
+        visitor(from_mut(&mut self.count));
+    }
+}
+
+/// Sums over the errors of the neighbours' predictions, and over the pixel posterior's variances.
+#[derive(Debug)]
+struct PredictionErrors {
+    /// Σ (ẑ − m)(ẑ − m)ᵀ, `[r, r]`, upper triangle.
+    outer: Vec<f64>,
+    count: f64,
+    /// Σ of the diagonal of P over a sample, `[r]`.
+    variance: Vec<f64>,
+    sampled: f64,
+}
+
+impl PredictionErrors {
+    fn new(rank: usize) -> Self {
+        Self {
+            outer: vec![0.0; rank * rank],
+            count: 0.0,
+            variance: vec![0.0; rank],
+            sampled: 0.0,
         }
-        self.second_moment.merge(&other.second_moment);
-        self.responsibility += other.responsibility;
-        self.count += other.count;
+    }
+}
+
+impl Sums for PredictionErrors {
+    fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64])) {
+        visitor(&mut self.outer);
+        visitor(&mut self.variance);
+        visitor(from_mut(&mut self.count));
+        visitor(from_mut(&mut self.sampled));
     }
 }
 
@@ -310,6 +362,12 @@ mod tests {
         pixels.collect()
     }
 
+    fn learn(means: PosteriorMeans<'_>, prior: &Prior) -> Option<NeighbourPrior> {
+        let means = Partition::single(means);
+        let learned = NeighbourPrior::learn(&means, prior, None, &SequentialExecutor);
+        pollster::block_on(learned).unwrap()
+    }
+
     fn unit_prior() -> Prior {
         Prior::new(&[0.0; 2], vec![1.0, 0.0, 0.0, 1.0])
     }
@@ -320,8 +378,9 @@ mod tests {
         let z = coefficients(rect);
         let equations = synthetic_equations(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
         let prior = unit_prior();
-        let means = [PosteriorMeans::new(&equations, rect, &prior, &[0.0; 3])];
-        let learned = NeighbourPrior::learn(&means, &prior, None, &SequentialExecutor).unwrap();
+        let means = || PosteriorMeans::new(&equations, rect, &prior, &[0.0; 3]);
+        let learned = learn(means(), &prior).unwrap();
+        let means = [means()];
 
         let mut solver = PosteriorSolver::new(2);
         let mut errors = [0.0; 2];
@@ -357,13 +416,8 @@ mod tests {
             let rect = region(side);
             let z = coefficients(rect);
             let equations = synthetic_equations(rect, &GRAM_DIAGONAL, &z, VARIANCE, normal());
-            let means = [PosteriorMeans::new(
-                &equations,
-                rect,
-                &prior,
-                &[threshold; 3],
-            )];
-            assert!(NeighbourPrior::learn(&means, &prior, None, &SequentialExecutor).is_none());
+            let means = PosteriorMeans::new(&equations, rect, &prior, &[threshold; 3]);
+            assert!(learn(means, &prior).is_none());
         }
     }
 }

@@ -5,7 +5,8 @@
 //! the sums are vector operations of length r.
 
 use super::posterior_means::{PREDICTORS, PixelObservationPosition, PosteriorMeans};
-use crate::linalg::{self, add_scaled};
+use crate::job_executor::Sums;
+use crate::linalg;
 
 /// Ridge, as a share of the predictors' mean square, that keeps the regressions well posed.
 const RIDGE: f64 = 1e-3;
@@ -14,7 +15,7 @@ const RIDGE: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub(super) struct RegressionSums {
     rank: usize,
-    /// `[predictor, predictor, r]`, where the first index is at most the second.
+    /// `[pair, r]`, for the pairs (i, j) of predictors with i ≤ j, by i and then j.
     gram: Vec<f64>,
     /// `[predictor, r]`.
     pub right_hand_side: Vec<f64>,
@@ -24,7 +25,7 @@ impl RegressionSums {
     pub fn new(rank: usize) -> Self {
         Self {
             rank,
-            gram: vec![0.0; PREDICTORS * PREDICTORS * rank],
+            gram: vec![0.0; PREDICTORS * (PREDICTORS + 1) / 2 * rank],
             right_hand_side: vec![0.0; PREDICTORS * rank],
         }
     }
@@ -42,7 +43,7 @@ impl RegressionSums {
         for (n, &(i, a)) in predictors.iter().enumerate() {
             add_products(&mut self.right_hand_side[i * rank..][..rank], a, target);
             for &(j, b) in &predictors[n..] {
-                add_products(&mut self.gram[(i * PREDICTORS + j) * rank..][..rank], a, b);
+                add_products(&mut self.gram[pair(i, j) * rank..][..rank], a, b);
             }
         }
     }
@@ -52,17 +53,16 @@ impl RegressionSums {
         self.gram[0]
     }
 
-    pub fn merge(&mut self, other: &Self) {
-        add_scaled(&mut self.gram, 1.0, &other.gram);
-        add_scaled(&mut self.right_hand_side, 1.0, &other.right_hand_side);
-    }
-
     /// Cholesky factors of the components' normal equations, `[r][predictor, predictor]`.
     pub fn cholesky_factors(&self) -> Vec<f64> {
-        let mut factors = Vec::with_capacity(self.gram.len());
+        let mut factors = Vec::with_capacity(self.rank * PREDICTORS * PREDICTORS);
         for k in 0..self.rank {
-            let entries = self.gram.iter().skip(k).step_by(self.rank);
-            let mut a: Vec<f64> = entries.copied().collect();
+            let mut a = vec![0.0; PREDICTORS * PREDICTORS];
+            for i in 0..PREDICTORS {
+                for j in i..PREDICTORS {
+                    a[i * PREDICTORS + j] = self.gram[pair(i, j) * self.rank + k];
+                }
+            }
             let diagonal = |i: usize| i * (PREDICTORS + 1);
             let trace: f64 = (1..PREDICTORS).map(|i| a[diagonal(i)]).sum();
             let ridge = (RIDGE * trace / PREDICTORS as f64).max(f64::MIN_POSITIVE);
@@ -76,6 +76,19 @@ impl RegressionSums {
         }
         factors
     }
+}
+
+impl Sums for RegressionSums {
+    fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64])) {
+        visitor(&mut self.gram);
+        visitor(&mut self.right_hand_side);
+    }
+}
+
+/// Number of the pair (i, j) of predictors, i ≤ j.
+#[inline(always)]
+fn pair(i: usize, j: usize) -> usize {
+    i * PREDICTORS + j - i * (i + 1) / 2
 }
 
 /// Solves the regressions of one class: weights, `[predictor, r]`.

@@ -5,6 +5,8 @@
 //! is better than either. With the residuals a and b of the two on held-out patterns, `‖(1 − w) a + w b‖²` is least at
 //! `w = (aᵀa − aᵀb) / ‖a − b‖²`, clamped to 0..=1.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::inference::LearnedModel;
 use crate::capture::Measurements;
 use crate::job_executor::Executor;
@@ -26,7 +28,8 @@ pub(super) const TILE_CENTRE_SIDE_PX: u32 = 16;
 const REGION_CENTRE_SIDE_PX: u32 = 4;
 
 /// Inner products of the two methods' residuals on held-out patterns.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct BlendingGram {
     /// `aᵀa`, of the learned recovery.
     pub learned: f64,
@@ -89,23 +92,34 @@ impl BlendingGram {
 }
 
 /// NNLS, if blending with it pays over all of `regions`. Errors are those of [`PixelwiseRecovery::least_squares`].
-pub(super) fn fit_nnls_alternative(
+pub(super) async fn fit_nnls_alternative(
     model: &LearnedModel,
-    preparation: &RecoveryPreparationInput<impl Executor>,
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
     regions: &[TileRect],
 ) -> Result<Option<PixelwiseRecovery>, RecoverError> {
     let (measurements, split) = (preparation.measurements, preparation.split);
-    let nnls = PixelwiseRecovery::least_squares(preparation)?;
-    let products = preparation.executor.map(regions.len(), |i| {
+    let nnls = PixelwiseRecovery::least_squares(preparation).await?;
+    let region_products = |i: usize| {
         let rect = centre(regions[i], REGION_CENTRE_SIDE_PX);
-        BlendingGram::recover(model, &nnls, measurements, split, rect)
-    });
+        vec![BlendingGram::recover(
+            model,
+            &nnls,
+            measurements,
+            split,
+            rect,
+        )]
+    };
+    let executor = preparation.executor;
+    let products = executor.all_gather(regions.len(), region_products).await?;
     let sum = |a: BlendingGram, b: BlendingGram| BlendingGram {
         learned: a.learned + b.learned,
         cross: a.cross + b.cross,
         nnls: a.nnls + b.nnls,
     };
-    let total = products.into_iter().fold(BlendingGram::default(), sum);
+    let total = products
+        .into_iter()
+        .flatten()
+        .fold(BlendingGram::default(), sum);
     Ok((total.best_weight(MIN_PICTURE_GAIN) > 0.0).then_some(nnls))
 }
 

@@ -11,6 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::equations::ObservationEquations;
+use crate::job_executor::Sums;
 use crate::linalg::{self, add_scaled, dot};
 
 /// Smallest variance along any direction, as a share of the mean variance: keeps the inverse finite.
@@ -154,6 +155,7 @@ pub(super) struct SecondMoment {
     covariance: Vec<f64>,
     /// Σ w over all observations and over the sample.
     weights: [f64; 2],
+    /// Observations added one by one.
     count: usize,
 }
 
@@ -187,15 +189,6 @@ impl SecondMoment {
         is_sampled
     }
 
-    pub fn merge(&mut self, other: &Self) {
-        add_scaled(&mut self.outer, 1.0, &other.outer);
-        add_scaled(&mut self.covariance, 1.0, &other.covariance);
-        for (weight, other) in self.weights.iter_mut().zip(other.weights) {
-            *weight += other;
-        }
-        self.count += other.count;
-    }
-
     /// All observations over the sample, by their weights.
     pub fn sampling_ratio(&self) -> f64 {
         let [all, sampled] = self.weights;
@@ -207,5 +200,13 @@ impl SecondMoment {
         let ratio = self.sampling_ratio();
         add_scaled(&mut self.outer, ratio, &self.covariance);
         self.outer
+    }
+}
+
+impl Sums for SecondMoment {
+    fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64])) {
+        visitor(&mut self.outer);
+        visitor(&mut self.covariance);
+        visitor(&mut self.weights);
     }
 }

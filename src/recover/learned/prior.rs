@@ -18,15 +18,16 @@
 //!
 //! The noise factor, E‖y − f B z‖² over its expected value, absorbs what the basis cannot represent.
 
+use std::slice::from_mut;
+
 use serde::{Deserialize, Serialize};
 
 use super::equations::{MinReliableBrightness, ObservationEquations, PHASES};
 use super::posterior::{PosteriorSolver, PriorPrecision, SecondMoment};
-use crate::job_executor::Executor;
+use super::training_equations::TrainingEquations;
+use crate::job_executor::{Cancelled, Executor, Sums, add};
 use crate::linalg::{self, add_scaled, vectorise};
 
-/// If at least one in so many observations has a full window, the others are left out.
-const FULL_WINDOW_RATIO: usize = 4;
 /// Weight of the pooled mean in the mean of a sub-element position, in observations.
 const POOLED_MEAN_WEIGHT: f64 = 20.0;
 const MIN_NOISE_FACTOR: f64 = 0.1;
@@ -85,28 +86,31 @@ impl Prior {
         solver.infer(equations, index, self.noise_factor, &self.precision, mean)
     }
 
-    /// One iteration of EM over the bright observations of `regions`, with a step of `step` times the M step.
-    pub fn em_iteration(
+    /// One iteration of EM over the bright observations of `training`, with a step of `step` times the M step.
+    ///
+    /// # Errors
+    /// [`Cancelled`]; the prior then stays as it is.
+    pub async fn em_iteration(
         &mut self,
-        regions: &[ObservationEquations],
+        training: &TrainingEquations,
         min_brightness: &MinReliableBrightness,
         step: usize,
         executor: &impl Executor,
-    ) {
-        // An observation whose window is partly outside the light plane determines little of its function and slows EM
-        // down.
-        let observations = || regions.iter().flat_map(|region| &region.observations);
-        let full = observations().filter(|o| o.has_full_window).count();
-        let only_full = FULL_WINDOW_RATIO * full >= observations().count();
-        let parts = executor.map(regions.len(), |i| {
-            vectorise(
-                #[inline(always)]
-                || self.expectation(&regions[i], min_brightness, only_full),
-            )
-        });
-        let mut total = EStepStatistics::new(self.rank);
-        parts.iter().for_each(|part| total.merge(part));
+    ) -> Result<(), Cancelled> {
+        let add_part = |part: usize, total: &mut EStepStatistics| {
+            let regions = training.regions.part(part);
+            let sums = executor.map(regions.len(), |i| {
+                vectorise(
+                    #[inline(always)]
+                    || self.expectation(&regions[i], min_brightness, training.only_full_windows),
+                )
+            });
+            sums.into_iter().for_each(|mut sums| add(total, &mut sums));
+        };
+        let total = executor.all_reduce(|| EStepStatistics::new(self.rank), add_part);
+        let total = total.await?;
         self.maximisation(total, step);
+        Ok(())
     }
 
     #[inline(always)]
@@ -194,16 +198,16 @@ impl EStepStatistics {
             measurements: 0.0,
         }
     }
+}
 
-    fn merge(&mut self, other: &Self) {
-        for phase in 0..PHASES {
-            self.counts[phase] += other.counts[phase];
-            add_scaled(&mut self.sums[phase], 1.0, &other.sums[phase]);
-        }
-        self.second_moment.merge(&other.second_moment);
-        self.squared_residual += other.squared_residual;
-        self.predicted_variance += other.predicted_variance;
-        self.measurements += other.measurements;
+impl Sums for EStepStatistics {
+    fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64])) {
+        visitor(&mut self.counts);
+        self.sums.iter_mut().for_each(|sum| visitor(sum));
+        self.second_moment.visit(visitor);
+        visitor(from_mut(&mut self.squared_residual));
+        visitor(from_mut(&mut self.predicted_variance));
+        visitor(from_mut(&mut self.measurements));
     }
 }
 
@@ -239,14 +243,12 @@ mod tests {
             let squares = right.iter().zip(GRAM_DIAGONAL).map(|(b, g)| b * b / g);
             observation.energy = squares.sum();
         }
+        let training = TrainingEquations::of_region(equations);
         let mut prior = Prior::new(&[0.0; 3], vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
         for &step in steps {
-            prior.em_iteration(
-                std::slice::from_ref(&equations),
-                &[0.0; CHANNELS],
-                step,
-                &SequentialExecutor,
-            );
+            let iteration =
+                prior.em_iteration(&training, &[0.0; CHANNELS], step, &SequentialExecutor);
+            pollster::block_on(iteration).unwrap();
         }
         std::array::from_fn(|k| prior.covariance[4 * k])
     }

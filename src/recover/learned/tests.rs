@@ -1,13 +1,19 @@
 //! Learned recovery of synthetic objects whose light transport functions are known.
 
+use std::ops::Range;
+use std::sync::{Barrier, Mutex};
+
 use super::basis::LearnedBasis;
 use super::equations::{ObservationEquations, PixelObservation};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
 use crate::capture::{CameraRowSet, NoiseModel, Pattern};
-use crate::job_executor::{Executor, SequentialExecutor};
+use crate::job_executor::{Cancelled, Executor, SequentialExecutor};
 use crate::recover::sampling::pixels_by_window;
-use crate::recover::{TailEstimate, WindowSizeEstimate, mean_function};
+use crate::recover::{
+    Method, PreparedRecovery, RecoverySettings, SparsityBasis, TailEstimate, WindowSizeEstimate,
+    mean_function,
+};
 use crate::transport::{
     CHANNELS, CameraPixel, Correspondence, Extent, TileTransportFunctions, Window,
 };
@@ -168,8 +174,19 @@ fn learn(
 ) -> Result<LearnedRecovery, RecoverError> {
     let split = HoldoutSplit::new(&measurements.patterns);
     let preparation = preparation(measurements, &split, executor);
-    let mean = mean_function::mean_function(&preparation)?;
-    LearnedRecovery::new(&preparation, &mean)
+    pollster::block_on(async {
+        let mean = mean_function::mean_function(&preparation).await?;
+        LearnedRecovery::new(&preparation, &mean).await
+    })
+}
+
+fn least_squares(preparation: &RecoveryPreparationInput<impl Executor>) -> PixelwiseRecovery {
+    pollster::block_on(PixelwiseRecovery::least_squares(preparation)).unwrap()
+}
+
+fn estimate_window(measurements: &Measurements) -> WindowSizeEstimate {
+    let estimate = WindowSizeEstimate::from_measurements(measurements, &SequentialExecutor);
+    pollster::block_on(estimate).unwrap()
 }
 
 /// A reproducible stream of nearly normal numbers of variance 1.
@@ -228,7 +245,7 @@ fn learned_recovery_beats_least_squares_with_few_patterns() {
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
     let split = HoldoutSplit::new(&measurements.patterns);
     let preparation = preparation(&measurements, &split, &SequentialExecutor);
-    let direct = PixelwiseRecovery::least_squares(&preparation).unwrap();
+    let direct = least_squares(&preparation);
     let ours: Vec<_> = geometry
         .tiles()
         .map(|rect| {
@@ -263,7 +280,7 @@ fn short_exposures_weigh_less_than_long_ones() {
         let learned = learn(measurements, &SequentialExecutor).unwrap();
         let split = HoldoutSplit::new(&measurements.patterns);
         let preparation = preparation(measurements, &split, &SequentialExecutor);
-        let direct = PixelwiseRecovery::least_squares(&preparation).unwrap();
+        let direct = least_squares(&preparation);
         let learned = geometry.tiles().map(|rect| {
             let tile = learned.tile(measurements, &split, rect);
             tile.functions(&geometry, Some(learned.basis()))
@@ -296,6 +313,73 @@ fn execution_order_does_not_change_the_result() {
     );
 }
 
+/// One of several processes that recover together; here they are threads.
+struct ThreadOfGroup<'a> {
+    rank: usize,
+    barrier: &'a Barrier,
+    /// By rank.
+    messages: &'a Mutex<Vec<Vec<Vec<u8>>>>,
+    size: usize,
+}
+
+impl Executor for ThreadOfGroup<'_> {
+    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        SequentialExecutor.map(count, work)
+    }
+
+    fn own_jobs(&self, count: usize) -> Range<usize> {
+        self.rank * count / self.size..(self.rank + 1) * count / self.size
+    }
+
+    async fn exchange(&self, own: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>, Cancelled> {
+        self.messages.lock().unwrap()[self.rank] = own;
+        self.barrier.wait();
+        let all = self.messages.lock().unwrap().concat();
+        self.barrier.wait();
+        Ok(all)
+    }
+}
+
+#[test]
+fn a_group_of_processes_prepares_the_same_recovery() {
+    let (measurements, _) = measurements(30, 3);
+    let window = geometry().window;
+    let prepare = |method, executor: &ThreadOfGroup| {
+        let settings = RecoverySettings { method, window };
+        let recovery = PreparedRecovery::prepare(&measurements, settings, executor);
+        let recovery = pollster::block_on(recovery).unwrap();
+        let snr = recovery.holdout_validation().unwrap().snr().unwrap();
+        (postcard::to_allocvec(&recovery).unwrap(), snr.0.to_bits())
+    };
+    let prepare_in_group = |method, size| -> Vec<_> {
+        let (barrier, messages) = (Barrier::new(size), Mutex::new(vec![Vec::new(); size]));
+        std::thread::scope(|scope| {
+            let threads = (0..size).map(|rank| {
+                let thread = ThreadOfGroup {
+                    rank,
+                    barrier: &barrier,
+                    messages: &messages,
+                    size,
+                };
+                scope.spawn(move || prepare(method, &thread))
+            });
+            let threads: Vec<_> = threads.collect();
+            threads.into_iter().map(|t| t.join().unwrap()).collect()
+        })
+    };
+    for method in [
+        Method::Learned,
+        Method::Nnls,
+        Method::Bpdn(SparsityBasis::Identity),
+    ] {
+        let alone = &prepare_in_group(method, 1)[0];
+        for size in [2, 3] {
+            let group = prepare_in_group(method, size);
+            assert!(group.iter().all(|one| one == alone), "{method:?}, {size}");
+        }
+    }
+}
+
 #[test]
 fn training_uses_pixels_with_saturated_samples() {
     let geometry = geometry();
@@ -319,8 +403,7 @@ fn training_uses_pixels_with_saturated_samples() {
 #[test]
 fn estimated_band_is_as_wide_as_the_objects() {
     let (measurements, _) = measurements(80, 7);
-    let estimate =
-        WindowSizeEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
+    let estimate = estimate_window(&measurements);
     // The estimate has a margin of one ring.
     let side = estimate.window.side();
     assert!((WINDOW..=WINDOW + 2).contains(&side), "{estimate:?}");
@@ -372,8 +455,7 @@ fn saturated_photographs_are_an_overexposed_error() {
     }
     let error = learn(&measurements, &SequentialExecutor).unwrap_err();
     assert!(matches!(error, RecoverError::Overexposed), "{error}");
-    let estimate =
-        WindowSizeEstimate::from_measurements(&measurements, &SequentialExecutor).unwrap();
+    let estimate = estimate_window(&measurements);
     assert_eq!(estimate.band, TailEstimate::Undetermined);
 }
 

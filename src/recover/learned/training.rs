@@ -9,14 +9,15 @@
 //! 3. [`RecoveryPreparationInput::select_neighbour_prior`] compares the errors on held-out patterns with and without it.
 
 use super::basis::LearnedBasis;
-use super::equations::{ObservationEquations, min_reliable_brightness, with_margin};
+use super::equations::{ObservationEquations, with_margin};
 use super::inference::LearnedModel;
 use super::initial_prior::{MAX_INITIAL_RANK, initial_prior, smooth, truncate_basis};
 use super::neighbour_prior::NeighbourPrior;
 use super::nnls_blending::centre;
 use super::nonnegativity::NonNegativityPenalty;
 use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PosteriorMeans};
-use crate::job_executor::Executor;
+use super::training_equations::TrainingEquations;
+use crate::job_executor::{Cancelled, Executor};
 use crate::recover::error::RecoverError;
 use crate::recover::mean_function;
 use crate::recover::preparation_input::RecoveryPreparationInput;
@@ -63,21 +64,26 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
     ///
     /// # Errors
     /// [`RecoverError::NoSignal`] where no rank has a finite error, [`RecoverError::Cancelled`] after cancellation.
-    pub(super) fn fit_basis(&self, mean_function: &[f64]) -> Result<LearnedModel, RecoverError> {
+    pub(super) async fn fit_basis(
+        &self,
+        mean_function: &[f64],
+    ) -> Result<LearnedModel, RecoverError> {
         let side = self.geometry.window.side() as usize;
         let mean = smooth(mean_function, side);
         let (functions, mut prior) = initial_prior(&mean, side, self.executor);
         let basis = LearnedBasis::new(&functions, &mean);
         let squares = mean_function::sample_squares(self.measurements);
-        let samples = self.executor.map(squares.len(), |i| {
+        let training = TrainingEquations::new(self, squares.len(), |i| {
             self.equations(&basis, &self.split.training, squares[i])
         });
-        let min_brightness = min_reliable_brightness(&samples);
+        let training = training.await?;
+        let min_brightness = training.min_reliable_brightness;
         for step in INITIAL_EM_STEPS {
             self.executor.check_cancelled()?;
-            prior.em_iteration(&samples, &min_brightness, step, self.executor);
+            let iteration = prior.em_iteration(&training, &min_brightness, step, self.executor);
+            iteration.await?;
         }
-        drop(samples);
+        drop(training);
 
         let mut chosen: Option<(f64, LearnedModel)> = None;
         // A small window has fewer candidates.
@@ -94,10 +100,15 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
                 neighbour_prior: None,
                 min_brightness,
             };
-            let errors = self.executor.map(squares.len(), |i| {
-                model.held_out_errors(self.measurements, self.split, squares[i])[0]
-            });
-            let error = errors.iter().sum();
+            let held_out_error = |i: usize| {
+                let errors = model.held_out_errors(self.measurements, self.split, squares[i]);
+                vec![errors[0]]
+            };
+            let errors = self
+                .executor
+                .all_gather(squares.len(), held_out_error)
+                .await?;
+            let error = errors.iter().flatten().sum();
             let least = chosen.as_ref().map_or(error, |(least, _)| least.min(error));
             if error <= (1.0 + MAX_ERROR_INCREASE) * least {
                 chosen = Some((least, model));
@@ -108,54 +119,81 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
 
     /// The training regions of the neighbour prior, as many as there is memory for, without the border that holds their
     /// outer neighbours.
-    pub(super) fn training_regions(&self, rank: usize) -> Vec<TileRect> {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) async fn training_regions(&self, rank: usize) -> Result<Vec<TileRect>, Cancelled> {
         let regions = spread_squares(self.measurements, REGION_SIDE_PX, MAX_REGIONS);
-        let counts = self.executor.map(regions.len(), |i| {
+        let count = |i: usize| {
             let (all, rect) = (&self.split.all, self.with_neighbours(regions[i]));
-            ObservationEquations::count_gram_matrices(self.measurements, &self.geometry, all, rect)
-        });
-        let bytes = counts.iter().sum::<usize>() * rank * rank * size_of::<f64>();
+            let (measurements, geometry) = (self.measurements, &self.geometry);
+            let count =
+                ObservationEquations::count_gram_matrices(measurements, geometry, all, rect);
+            vec![count as u64]
+        };
+        let counts = self.executor.all_gather(regions.len(), count).await?;
+        let bytes = counts.iter().flatten().sum::<u64>() as usize * rank * rank * size_of::<f64>();
         if bytes <= MAX_GRAM_BYTES {
-            return regions;
+            return Ok(regions);
         }
         let fit = MAX_GRAM_BYTES / (bytes / regions.len()).max(1);
-        spread_squares(self.measurements, REGION_SIDE_PX, fit.max(MIN_REGIONS))
+        let count = fit.max(MIN_REGIONS);
+        Ok(spread_squares(self.measurements, REGION_SIDE_PX, count))
     }
 
     /// Continues EM of the pixel prior on `regions` from the patterns `pattern_indices`, and learns the neighbour prior,
     /// anew or from the one that the model has, or removes it.
-    pub(super) fn fit_priors(
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) async fn fit_priors(
         &self,
         model: &mut LearnedModel,
         pattern_indices: &[usize],
         regions: &[TileRect],
         learn_neighbour_prior: bool,
-    ) {
-        let equations = self.executor.map(regions.len(), |i| {
+    ) -> Result<(), Cancelled> {
+        let training = TrainingEquations::new(self, regions.len(), |i| {
             let rect = self.with_neighbours(regions[i]);
             self.equations(&model.basis, pattern_indices, rect)
         });
+        let training = training.await?;
         let (prior, min_brightness) = (&mut model.prior, &model.min_brightness);
         for _ in 0..FINAL_EM_ITERATIONS {
-            prior.em_iteration(&equations, min_brightness, 1, self.executor);
+            let iteration = prior.em_iteration(&training, min_brightness, 1, self.executor);
+            iteration.await?;
         }
         let start = model.neighbour_prior.take();
         if learn_neighbour_prior {
-            let means = self.executor.map(regions.len(), |i| {
-                PosteriorMeans::new(&equations[i], regions[i], prior, min_brightness)
+            let means = training.regions.map(self.executor, |i, equations| {
+                PosteriorMeans::new(equations, regions[i], prior, min_brightness)
             });
-            model.neighbour_prior = NeighbourPrior::learn(&means, prior, start, self.executor);
+            let learned = NeighbourPrior::learn(&means, prior, start, self.executor);
+            model.neighbour_prior = learned.await?;
         }
+        Ok(())
     }
 
     /// Removes the neighbour prior unless it lowers the error on held-out patterns over the middles of `regions`.
-    pub(super) fn select_neighbour_prior(&self, model: &mut LearnedModel, regions: &[TileRect]) {
-        let errors = self.executor.map(regions.len(), |i| {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) async fn select_neighbour_prior(
+        &self,
+        model: &mut LearnedModel,
+        regions: &[TileRect],
+    ) -> Result<(), Cancelled> {
+        let held_out_errors = |i: usize| {
             let rect = centre(regions[i], SELECTION_SIDE_PX);
-            model.held_out_errors(self.measurements, self.split, rect)
-        });
-        let [without, with] = [0, 1].map(|i| errors.iter().map(|e| e[i]).sum::<f64>());
+            vec![model.held_out_errors(self.measurements, self.split, rect)]
+        };
+        let errors = self
+            .executor
+            .all_gather(regions.len(), held_out_errors)
+            .await?;
+        let [without, with] = [0, 1].map(|i| errors.iter().flatten().map(|e| e[i]).sum::<f64>());
         model.neighbour_prior = model.neighbour_prior.take().filter(|_| with < without);
+        Ok(())
     }
 
     fn equations(

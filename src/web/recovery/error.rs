@@ -9,6 +9,15 @@ use crate::recover::RecoverError;
 use crate::transport::GeometryError;
 use crate::web::CodedError;
 
+/// The error for bytes that the other worker cannot have sent.
+pub(super) fn corrupt() -> CodedError {
+    CodedError::internal("a recovery was corrupted on its way from its worker")
+}
+
+pub(super) fn out_of_memory() -> CodedError {
+    CodedError::new("recover-memory", "there is no memory for the recovery")
+}
+
 impl From<CaptureError> for CodedError {
     fn from(error: CaptureError) -> Self {
         use CaptureErrorKind as Kind;
@@ -86,7 +95,7 @@ impl From<RecoverError> for CodedError {
                 "recover-overexposed",
                 "photograph with less exposure, or add shots with less",
             ),
-            RecoverError::Cancelled(_) => ("internal", ""),
+            RecoverError::Cancelled(_) => ("worker-unavailable", ""),
         };
         with_remedy(code, &error, remedy)
     }

@@ -1,9 +1,12 @@
 //! Measurements from a capture folder, or from pictures that the page has in memory.
 
+use std::sync::Arc;
+
 use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::capture_files::PageFiles;
+use super::error::{corrupt, out_of_memory};
 use crate::calibrate::{GrayCodePhotos, LightPlaneAxis};
 use crate::capture::{
     CameraRowSet, CaptureFolder, LinearPhoto, Manifest, Measurements, NoiseModel, Pattern, Shot,
@@ -15,10 +18,11 @@ use crate::web::progress::{ReportingExecutor, report_job};
 
 /// The measurements of a recovery, and what its file says of their origin.
 #[wasm_bindgen]
+#[derive(Clone)]
 pub struct MeasurementInput {
-    pub(super) measurements: Measurements,
+    pub(super) measurements: Arc<Measurements>,
     /// Title, creator, rights, and the patterns by name.
-    pub(super) manifest: Manifest,
+    pub(super) manifest: Arc<Manifest>,
     /// Indices of the manifest's shots that the measurements are of.
     pub(super) shots: Vec<usize>,
     pub(super) saturated_samples: usize,
@@ -66,10 +70,32 @@ impl MeasurementInput {
         measurements.rows = rows;
         measurements.noise = NoiseModel::with_gain_from(&measurements);
         Ok(Self {
-            measurements,
-            manifest: manifest.clone(),
+            measurements: Arc::new(measurements),
+            manifest: Arc::new(manifest.clone()),
             shots,
             saturated_samples,
+        })
+    }
+
+    /// Bytes for [`unpack`](Self::unpack) in another worker of a group.
+    ///
+    /// # Errors
+    /// `recover-memory` if memory is missing.
+    pub fn pack(&self) -> Result<Vec<u8>, CodedError> {
+        postcard::to_allocvec(&*self.measurements).map_err(|_| out_of_memory())
+    }
+
+    /// The measurements alone, without what their file says of their origin.
+    ///
+    /// # Errors
+    /// Code `internal` if the bytes are not those of [`pack`](Self::pack).
+    pub fn unpack(packed: &[u8]) -> Result<Self, CodedError> {
+        let measurements: Measurements = postcard::from_bytes(packed).map_err(|_| corrupt())?;
+        Ok(Self {
+            shots: (0..measurements.photos.len()).collect(),
+            measurements: Arc::new(measurements),
+            manifest: Arc::default(),
+            saturated_samples: 0,
         })
     }
 
@@ -282,14 +308,14 @@ impl MeasurementBuilder {
         };
         let listed = shots.iter().map(shot).collect();
         Ok(MeasurementInput {
-            measurements,
-            manifest: Manifest {
+            measurements: Arc::new(measurements),
+            manifest: Arc::new(Manifest {
                 title,
                 creator,
                 rights,
                 shots: listed,
                 ..Manifest::default()
-            },
+            }),
             shots,
             saturated_samples: self.saturated_samples,
         })

@@ -2,10 +2,12 @@
 //!
 //! [`MeasurementInput`] reads a capture folder; [`MeasurementBuilder`] takes patterns and photographs that the page has
 //! in memory. A [`Recovery`] prepares, recovers tiles and encodes; other workers recover tiles for it by
-//! [`TileRecovery`]. [`RecoveredTransport`] is what a page shows of the result. Every call runs to its end: a page cancels by ending the worker.
+//! [`TileRecovery`], or prepare it together with it ([`group_executor`]). [`RecoveredTransport`] is what a page shows of the
+//! result. Every call runs to its end: a page cancels by ending the worker.
 
 mod capture_files;
 mod error;
+mod group_executor;
 mod linear_png;
 mod measurement_input;
 mod recovered;

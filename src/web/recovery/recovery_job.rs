@@ -5,6 +5,8 @@ use std::io::{self, ErrorKind};
 use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
 
+use super::error::out_of_memory;
+use super::group_executor::{GroupExecutor, ProcessGroup};
 use super::measurement_input::MeasurementInput;
 use crate::capture::Measurements;
 use crate::export::{
@@ -15,7 +17,7 @@ use crate::recover::{
 };
 use crate::transport::{Basis, Decibels, Window};
 use crate::web::CodedError;
-use crate::web::progress::ReportingExecutor;
+use crate::web::progress::{ReportingExecutor, report_jobs_of};
 
 /// A recovery that is prepared. Tiles can be recovered in any order, here or in other workers.
 #[wasm_bindgen]
@@ -32,26 +34,28 @@ pub struct Recovery {
 #[wasm_bindgen]
 impl Recovery {
     /// Chooses the window, if none is given, and learns or chooses what the method (`learned`, `nnls` or `bpdn`, with
-    /// basis `identity`, `dct` or `haar`) needs. `onJob` gets the number of jobs done.
+    /// basis `identity`, `dct` or `haar`) needs: alone, or in a `group` with workers that call this
+    /// for the same measurements. `onJob` gets the number of jobs done.
     ///
     /// # Errors
-    /// Codes that begin with `recover-`.
-    pub fn prepare(
-        input: MeasurementInput,
+    /// Codes that begin with `recover-`; `worker-unavailable` if the group has lost a worker.
+    pub async fn prepare(
+        input: &MeasurementInput,
         method: &str,
         basis: Option<String>,
         window: Option<u32>,
-        #[wasm_bindgen(js_name = onJob)] on_job: &Function,
+        #[wasm_bindgen(js_name = onJob)] on_job: Function,
+        group: Option<ProcessGroup>,
     ) -> Result<Self, CodedError> {
         let method = parse_method(method, basis.as_deref())?;
         let window = window.map(Window::new).transpose()?;
-        let prepared = ReportingExecutor::run(on_job, |executor| {
-            export::prepare(&input.measurements, method, window, executor)
-        });
-        let prepared = prepared.map_err(|error| name_shots(&input, error))?;
+        let executor = GroupExecutor::join(group);
+        let preparation = export::prepare(&input.measurements, method, window, &executor);
+        let prepared = report_jobs_of(&on_job, preparation).await;
+        let prepared = prepared.map_err(|error| name_shots(input, error))?;
         let tiles = prepared.recovery.geometry().tile_grid().area();
         Ok(Self {
-            input,
+            input: input.clone(),
             prepared,
             method,
             records: vec![None; tiles],
@@ -70,7 +74,7 @@ impl Recovery {
             full_scale,
             noise,
             ..
-        } = &self.input.measurements;
+        } = &*self.input.measurements;
         postcard::to_allocvec(&(self.recovery(), patterns, full_scale, noise))
             .map_err(|_| out_of_memory())
     }
@@ -102,8 +106,17 @@ impl Recovery {
     /// Code `internal` if there is no such tile; `recover-memory` if memory is missing.
     #[wasm_bindgen(js_name = recoverTile)]
     pub fn recover_tile(&mut self, index: usize) -> Result<(), CodedError> {
-        let record = encoded_tile(self.recovery(), &self.input.measurements, index)?;
+        let record = self.tile_record(index)?;
         self.put_tile(index, record)
+    }
+
+    /// Recovers a tile for [`put_tile`](Self::put_tile) in another worker of the group.
+    ///
+    /// # Errors
+    /// Code `internal` if there is no such tile; `recover-memory` if memory is missing.
+    #[wasm_bindgen(js_name = tileRecord)]
+    pub fn tile_record(&self, index: usize) -> Result<Vec<u8>, CodedError> {
+        encoded_tile(self.recovery(), &self.input.measurements, index)
     }
 
     /// Takes a tile that another worker has recovered.
@@ -272,10 +285,6 @@ fn no_such_tile() -> CodedError {
     CodedError::internal("the recovery has no such tile")
 }
 
-fn out_of_memory() -> CodedError {
-    CodedError::new("recover-memory", "there is no memory for the recovery")
-}
-
 fn parse_method(method: &str, basis: Option<&str>) -> Result<Method, CodedError> {
     let invalid = |field: &str, value: &str, allowed: &str| {
         let message = format!("{field} is \"{value}\"; it must be {allowed}");
@@ -299,9 +308,9 @@ fn name_shots(input: &MeasurementInput, error: RecoverError) -> CodedError {
     };
     let names = pattern_indices.iter().map(|&l| {
         let i = input.shots[l];
-        match input.manifest.shots[i].photo.as_str() {
-            "" => format!("photograph {i}"),
-            photo => format!("shots[{i}] ({photo})"),
+        match input.manifest.shots.get(i).map(|shot| &*shot.photo) {
+            None | Some("") => format!("photograph {i}"),
+            Some(photo) => format!("shots[{i}] ({photo})"),
         }
     });
     let names = names.collect::<Vec<_>>().join(", ");

@@ -2,6 +2,7 @@
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
+use super::error::corrupt;
 use super::recovery_job::encoded_tile;
 use crate::capture::{CameraRowSet, LinearPhoto, Measurements};
 use crate::recover::PreparedRecovery;
@@ -12,11 +13,6 @@ use crate::web::CodedError;
 pub struct TileRecovery {
     recovery: PreparedRecovery,
     measurements: Measurements,
-}
-
-/// The error for bytes that the other worker cannot have sent.
-fn corrupt() -> CodedError {
-    CodedError::internal("a recovery was corrupted on its way from its worker")
 }
 
 #[wasm_bindgen]

@@ -13,6 +13,16 @@ export interface PageFiles {
   read(name: string, offset: number, length: number): Uint8Array;
 }
 
+/** This worker's place in a group of workers that run one algorithm together, and its connections to the others. */
+export interface ProcessGroup {
+  /** Number of this worker, from 0 on. */
+  readonly rank: number;
+  /** Number of workers. */
+  readonly size: number;
+  /** Sends `own` to the other workers; resolves with the messages of all, in the order of their ranks. */
+  exchange(own: Uint8Array[]): Promise<Uint8Array[]>;
+}
+
 /** Gets the number of jobs that are done. */
 type OnJob = (jobs: number) => void;
 
@@ -24,6 +34,8 @@ export interface MeasurementInput extends Freeable {
   readonly unknownFields: string[];
   /** Six numbers, row by row. */
   readonly correspondence: Float64Array;
+  /** For `unpack` in another worker of a group. */
+  pack(): Uint8Array;
 }
 
 /** Takes patterns and photographs one by one. */
@@ -54,6 +66,8 @@ export interface Recovery extends Freeable {
   /** All rows that they depend on, of all photographs. */
   packRows(first: number, end: number): Float32Array;
   recoverTile(index: number): void;
+  /** The record for `putTile` of another worker of the group. */
+  tileRecord(index: number): Uint8Array;
   putTile(index: number, record: Uint8Array): void;
   encode(
     snr: number | undefined,
@@ -102,6 +116,7 @@ export interface RecoveryModule {
   default(): Promise<{ readonly memory: Pick<WebAssembly.Memory, 'buffer'> }>;
   MeasurementInput: {
     readFolder(files: PageFiles, count: number | undefined, onShot: OnJob): MeasurementInput;
+    unpack(packed: Uint8Array): MeasurementInput;
   };
   MeasurementBuilder: {
     new (
@@ -113,14 +128,15 @@ export interface RecoveryModule {
     ): MeasurementBuilder;
   };
   Recovery: {
-    /** Ends the input, also if it throws. */
+    /** In a group, with workers that call this for the same measurements, or alone. */
     prepare(
       input: MeasurementInput,
       method: string,
       basis: string | undefined,
       window: number | undefined,
       onJob: OnJob,
-    ): Recovery;
+      group: ProcessGroup | undefined,
+    ): Promise<Recovery>;
   };
   readPhotograph(files: PageFiles, name: string, black: number, white: number): LinearPng;
   readPattern(files: PageFiles, name: string, gamma: number): LinearPng;

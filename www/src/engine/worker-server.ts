@@ -9,8 +9,10 @@ export interface WorkerService<Task, Ready, Result> {
   /** Sent to the page with the news that the worker has started. */
   readonly ready: Ready;
   /** Does one task; gives its result and the buffers to transfer with it. A long task reports the steps it has done. */
-  handle(task: Task, onProgress: (steps: number) => void): readonly [Result, Transferable[]];
+  handle(task: Task, onProgress: (steps: number) => void): Answer<Result> | Promise<Answer<Result>>;
 }
+
+type Answer<Result> = readonly [Result, Transferable[]];
 
 /**
  * `null` if the page may not have workers. `create` calls `new Worker` with a literal address, for bundlers. The worker
@@ -44,9 +46,9 @@ export function serve<Task, Ready, Result>(
   const start = async (modules: typeof moduleFolder): Promise<void> => {
     setModuleFolder(modules);
     const service = await setUp();
-    const answer = ({ id, task }: WorkerRequest<Task>): void => {
+    const answer = async ({ id, task }: WorkerRequest<Task>): Promise<void> => {
       const onProgress = (steps: number) => send({ kind: 'progress', id, steps });
-      const [result, transfer] = service.handle(task, onProgress);
+      const [result, transfer] = await service.handle(task, onProgress);
       send({ kind: 'done', id, result }, transfer);
     };
     scope.onmessage = ({ data }) => void orReport(() => answer(data));

@@ -10,7 +10,9 @@ import type {
 import { takeOut } from '../photo/types.js';
 import { pageFiles } from './page-files.js';
 import { PictureReader } from './picture-reader.js';
+import { ConnectedGroup, type GroupMembership } from './process-group.js';
 import {
+  type Answers,
   type CoordinatorCalls,
   DEFAULT_GAMMA,
   type InputSummary,
@@ -29,7 +31,7 @@ import type { Correspondence, FileQuality, TileFunctions, TransportFunction } fr
 /** Of pictures that are compared with a photograph that was recovered from a folder. */
 const DEFAULT_CODES = { lightGamma: DEFAULT_GAMMA, black: 0, white: MAX_CODE };
 
-export class Coordinator implements CoordinatorCalls {
+export class Coordinator implements Answers<CoordinatorCalls> {
   #header: PicturesHeader | null = null;
   #reader: PictureReader | null = null;
   #dark: Float32Array | null = null;
@@ -92,11 +94,25 @@ export class Coordinator implements CoordinatorCalls {
     return this.#setInput(builder.finish(title, creator, rights));
   }
 
-  prepare({ method, basis, window }: PreparationSettings): PreparationSummary {
+  packInput(): Uint8Array {
+    return existing(this.#input).pack();
+  }
+
+  async prepare(
+    { method, basis, window }: PreparationSettings,
+    member: GroupMembership | null,
+  ): Promise<PreparationSummary> {
     const input = existing(this.#input);
-    this.#input = null;
     const { Recovery } = this.module;
-    this.#recovery = Recovery.prepare(input, method, basis, window, this.report);
+    const group = member ? new ConnectedGroup(member) : undefined;
+    try {
+      const prepared = Recovery.prepare(input, method, basis, window, this.report, group);
+      this.#recovery = await prepared;
+    } finally {
+      group?.close();
+    }
+    this.#input = null;
+    input.free();
     const { tiles, tileColumns, window: side, rank, expectedSnr } = this.#recovery;
     return { tiles, tileColumns, window: side, rank, expectedSnr };
   }

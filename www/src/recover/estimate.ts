@@ -35,21 +35,34 @@ export function defaultMemoryLimit(): number {
 export function estimateRecovery(
   size: RecoverySize,
   settings: RecoverySettings = {},
-  options: Pick<RecoverOptions, 'workers'> = {},
+  options: Pick<RecoverOptions, 'workers' | 'memoryLimit'> = {},
 ): RecoveryEstimate {
   const seconds = sumSeconds(stageSeconds(size, settings, options));
-  return { memoryBytes: memoryBytes(size, settings, options), seconds };
+  const { alone, together } = memoryBytes(size, settings, options);
+  const memory = preparesTogether(size, settings, options) ? together : alone;
+  return { memoryBytes: Math.round(memory), seconds };
+}
+
+/** Whether there is memory for all workers to have all measurements, and prepare the recovery together. */
+export function preparesTogether(
+  size: RecoverySize,
+  settings: RecoverySettings,
+  options: Pick<RecoverOptions, 'workers' | 'memoryLimit'>,
+): boolean {
+  const { memoryLimit = defaultMemoryLimit() } = options;
+  return memoryBytes(size, settings, options).together <= memoryLimit;
 }
 
 function windowArea({ window = DEFAULT_WINDOW }: RecoverySettings): number {
   return (window === 'auto' ? MAX_AUTO_WINDOW : window) ** 2;
 }
 
+/** Bytes of all workers, if only the coordinator has all measurements and if all have. */
 function memoryBytes(
   { width, height, lightWidth, lightHeight, photographs }: RecoverySize,
   settings: RecoverySettings,
   { workers = defaultWorkers() }: Pick<RecoverOptions, 'workers'>,
-): number {
+): { readonly alone: number; readonly together: number } {
   const area = windowArea(settings);
   const pixels = width * height;
   const tile = Math.min(pixels, TILE_SIDE ** 2);
@@ -57,9 +70,12 @@ function memoryBytes(
   // The module, the models of learned recovery, and a tile's equations.
   const each = 24 * 2 ** 20 + 8 * area * area * 16 + 2 * PIXEL_BYTES * tile * area;
   const patterns = PIXEL_BYTES * photographs * lightWidth * lightHeight;
-  const coordinator = PIXEL_BYTES * photographs * pixels + patterns + 4 * pixels * area;
-  const others = (workers - 1) * (2 * PIXEL_BYTES * photographs * rows + patterns);
-  return Math.round(workers * each + coordinator + others);
+  const measurements = PIXEL_BYTES * photographs * pixels + patterns;
+  const all = workers * each + measurements + 4 * pixels * area;
+  const strips = 2 * PIXEL_BYTES * photographs * rows + patterns;
+  // Measurements are packed before they are sent.
+  const packed = measurements + 2 * (workers - 1) * measurements;
+  return { alone: all + (workers - 1) * strips, together: workers > 1 ? all + packed : all };
 }
 
 /** Expected time of each stage of `recover`. */
@@ -87,7 +103,7 @@ export function encodingSeconds({ width, height }: PictureSize): number {
 }
 
 /** @throws {PhotoError} `recover-memory` if the recovery takes more than the limit */
-export function checkMemory(memoryBytes: number, limit = defaultMemoryLimit()): void {
+export function checkMemory(memoryBytes: number, limit: number): void {
   if (memoryBytes <= limit) return;
   const [needed, allowed] = [memoryBytes, limit].map((bytes) => Math.ceil(bytes / 2 ** 20));
   const message =

@@ -2,6 +2,7 @@
 
 import type { TransferredPhoto } from '../photo/types.js';
 import type { WorkerClient, WorkerLike } from '../shared/worker-client.js';
+import type { GroupMembership } from './process-group.js';
 import type {
   Correspondence,
   FileQuality,
@@ -96,8 +97,10 @@ export interface CoordinatorCalls {
   addGrayCode(axis: 'x' | 'y', bit: number, inverted: boolean, photograph: SentPicture): void;
   addShot(index: number, pattern: SentPicture, photograph: SentPicture, exposure: number): void;
   finishPictures(): InputSummary;
-  /** Reports the jobs that are done. */
-  prepare(settings: PreparationSettings): PreparationSummary;
+  /** For `learn` of a tile worker. */
+  packInput(): Uint8Array;
+  /** In a group with tile workers that `learn`, or alone. Reports the jobs that are done. */
+  prepare(settings: PreparationSettings, member: GroupMembership | null): PreparationSummary;
   /** For `unpack` of a tile worker. */
   pack(): Uint8Array;
   packRows(tileRow: number): PackedRows;
@@ -123,6 +126,8 @@ export interface CoordinatorCalls {
 }
 
 export interface TileWorkerCalls {
+  /** Prepares the recovery together with the coordinator; no need then to `unpack` and `setRows`. */
+  learn(packed: Uint8Array, settings: PreparationSettings, member: GroupMembership): void;
   unpack(packed: Uint8Array): void;
   setRows(rows: PackedRows): void;
   /** The tile's record, for `putTile` of the coordinator. */
@@ -130,6 +135,13 @@ export interface TileWorkerCalls {
 }
 
 export type RecoveryCalls = CoordinatorCalls & TileWorkerCalls;
+
+/** The methods of a worker that answers some of the calls, at once or later. */
+export type Answers<Calls> = {
+  [M in keyof Calls]: Calls[M] extends (...args: infer Args) => infer Result
+    ? (...args: Args) => Result | Promise<Result>
+    : never;
+};
 
 export interface RecoveryTask {
   readonly method: keyof RecoveryCalls;

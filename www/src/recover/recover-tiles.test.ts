@@ -8,10 +8,15 @@ const GRID = { tiles: TILES, tileColumns: COLUMNS };
 const ALL = Array.from({ length: TILES }, (_, tile) => tile);
 const byNumber = (a: number, b: number) => a - b;
 
-function recoverWith(tileWorkers: readonly FakeWorker[], coordinator = new FakeWorker()) {
+function recoverWith(
+  tileWorkers: readonly FakeWorker[],
+  coordinator = new FakeWorker(),
+  isPrepared = false,
+) {
   const shares: number[] = [];
   const clients = tileWorkers.map((worker) => fakeClient(worker));
-  const done = recoverTiles(fakeClient(coordinator), clients, GRID, (share) => shares.push(share));
+  const helpers = clients.map((worker) => ({ worker, isPrepared: Promise.resolve(isPrepared) }));
+  const done = recoverTiles(fakeClient(coordinator), helpers, GRID, (share) => shares.push(share));
   return { coordinator, done, shares };
 }
 
@@ -44,6 +49,16 @@ test('rows are requested before their worker needs them', async () => {
   await done;
   const secondRow = coordinator.log.indexOf('packRows', coordinator.log.indexOf('packRows') + 1);
   assert.ok(secondRow < coordinator.log.indexOf('putTile'));
+});
+
+test('a worker that has prepared the recovery needs no rows', async () => {
+  const worker = new FakeWorker();
+  const { coordinator, done } = recoverWith([worker], new FakeWorker(), true);
+  await done;
+  assert.deepEqual([...coordinator.tiles].sort(byNumber), ALL);
+  assert.ok(coordinator.log.includes('putTile'), 'it took part');
+  assert.ok(!coordinator.log.includes('pack') && !coordinator.log.includes('packRows'));
+  assert.deepEqual([...new Set(worker.log)], ['solveTile']);
 });
 
 test('a worker that dies loses nothing: its tiles go to the others', async () => {

@@ -6,10 +6,16 @@ import { TileSchedule } from './tile-schedule.js';
 
 type Client = Pick<RecoveryClient, 'call' | 'ready' | 'terminate'>;
 
-/** Rows that were requested before the worker needs them, so that it does not wait. */
+/** Rows that were requested before the worker needs them, so that it does not wait; `null` if it has all. */
 interface ClaimedRow {
   readonly row: number;
-  readonly rows: Promise<PackedRows>;
+  readonly rows: Promise<PackedRows> | null;
+}
+
+/** A worker, and whether it has prepared the recovery itself and therefore has all rows. */
+export interface TileHelper {
+  readonly worker: Client;
+  readonly isPrepared: Promise<boolean>;
 }
 
 /**
@@ -18,7 +24,7 @@ interface ClaimedRow {
  */
 export async function recoverTiles(
   coordinator: Client,
-  tileWorkers: readonly Client[],
+  helpers: readonly TileHelper[],
   { tiles, tileColumns }: { readonly tiles: number; readonly tileColumns: number },
   onTile: (share: number) => void,
 ): Promise<void> {
@@ -28,7 +34,7 @@ export async function recoverTiles(
     onTile(schedule.share);
   };
   try {
-    for (const worker of tileWorkers) void help(coordinator, worker, schedule, finish);
+    for (const helper of helpers) void help(coordinator, helper, schedule, finish);
     while (!schedule.isFinished) {
       const tile = schedule.takeAny();
       if (tile === undefined) {
@@ -39,38 +45,45 @@ export async function recoverTiles(
       finish(tile);
     }
   } finally {
-    for (const worker of tileWorkers) worker.terminate();
+    for (const { worker } of helpers) worker.terminate();
   }
 }
 
 /** Never rejects: after a failure, the tiles of the worker go to the others. */
 async function help(
   coordinator: Client,
-  worker: Client,
+  helper: TileHelper,
   schedule: TileSchedule,
   finish: (tile: number) => void,
 ): Promise<void> {
+  const { worker } = helper;
+  let hasAllRows = false;
   let claimed: ClaimedRow | null = null;
   let row: number | null = null;
   let tile: number | undefined;
   const claim = (): ClaimedRow | null => {
     const next = schedule.claimRow();
     if (next === undefined) return null;
-    const rows = coordinator.call('packRows', [next]);
-    rows.catch(() => {});
+    const rows = hasAllRows ? null : coordinator.call('packRows', [next]);
+    rows?.catch(() => {});
     return { row: next, rows };
   };
   try {
     await worker.ready();
+    hasAllRows = await helper.isPrepared;
     if (schedule.isFinished) return;
-    const packed = await coordinator.call('pack', []);
+    const packed = hasAllRows ? null : await coordinator.call('pack', []);
     claimed = claim();
-    await worker.call('unpack', [packed], { transfer: [packed.buffer as ArrayBuffer] });
+    if (packed) {
+      await worker.call('unpack', [packed], { transfer: [packed.buffer as ArrayBuffer] });
+    }
     while (claimed) {
       row = claimed.row;
       const rows = await claimed.rows;
       claimed = claim();
-      await worker.call('setRows', [rows], { transfer: [rows.samples.buffer as ArrayBuffer] });
+      if (rows) {
+        await worker.call('setRows', [rows], { transfer: [rows.samples.buffer as ArrayBuffer] });
+      }
       for (tile = schedule.takeFromRow(row); tile !== undefined; tile = schedule.takeFromRow(row)) {
         const record = await worker.call('solveTile', [tile]);
         const transfer = [record.buffer as ArrayBuffer];

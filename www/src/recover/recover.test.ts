@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { type RecoveryPorts, runRecovery } from './recover.js';
-import { type Answers, FakeWorker, settle, TILES } from './recovery-fakes.js';
+import { type FakeAnswers, FakeWorker, settle, TILES } from './recovery-fakes.js';
 import type { FolderInput, PicturesInput, RecoverOptions, RecoveryProgress } from './types.js';
 
 const MANIFEST = {
@@ -29,7 +29,7 @@ const PICTURES: PicturesInput = {
 function start(
   input: FolderInput | PicturesInput,
   options: RecoverOptions = {},
-  answers: Answers = {},
+  answers: FakeAnswers = {},
   ports: Partial<RecoveryPorts> = {},
 ) {
   const workers: FakeWorker[] = [];

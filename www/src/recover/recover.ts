@@ -4,11 +4,14 @@ import type { hasSimd } from '../engine/wasm-loader.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import {
   checkMemory,
+  defaultMemoryLimit,
   defaultWorkers,
   encodingSeconds,
   estimateRecovery,
+  preparesTogether,
   stageSeconds,
 } from './estimate.js';
+import { prepareTogether } from './prepare-together.js';
 import { ProgressTracker } from './progress-tracker.js';
 import type { RecoveryWorker } from './protocol.js';
 import { readInput, sizeOfInput } from './read-input.js';
@@ -46,7 +49,8 @@ export async function runRecovery(
   options: RecoverOptions,
   ports: RecoveryPorts,
 ): Promise<RecoveredPhotograph> {
-  const { signal, onProgress, workers = defaultWorkers(), memoryLimit } = options;
+  const { signal, onProgress, workers = defaultWorkers() } = options;
+  const { memoryLimit = defaultMemoryLimit() } = options;
   signal?.throwIfAborted();
   const startMs = performance.now();
   checkOptions(options);
@@ -56,7 +60,10 @@ export async function runRecovery(
   if (!ports.hasSimd()) throw noSimd();
   const size = await sizeOfInput(input);
   signal?.throwIfAborted();
-  if (size) checkMemory(estimateRecovery(size, settings, { workers }).memoryBytes, memoryLimit);
+  if (size) {
+    const { memoryBytes } = estimateRecovery(size, settings, { workers, memoryLimit });
+    checkMemory(memoryBytes, memoryLimit);
+  }
   const clients: RecoveryClient[] = [];
   const end = (): void => {
     for (const client of clients) client.terminate();
@@ -72,14 +79,28 @@ export async function runRecovery(
     }
     const [coordinator, ...tileWorkers] = clients;
     if (!coordinator) throw noWorkers();
+    const started: RecoveryClient[] = [];
+    for (const worker of tileWorkers) {
+      const onStart = () => started.push(worker);
+      worker.ready().then(onStart, () => {});
+    }
     await coordinator.ready();
     const summary = await readInput(coordinator, input, size, (share) => progress.report(share));
     progress.begin('preparing');
     const onJob = () => progress.report();
-    const prepared = coordinator.call('prepare', [preparationInput], { onProgress: onJob });
-    const preparation = await prepared;
+    const hasMemory = size && preparesTogether(size, settings, { workers, memoryLimit });
+    const group = hasMemory ? started : [];
+    const { summary: preparation, isPrepared } = await prepareTogether(
+      coordinator,
+      [...group],
+      preparationInput,
+      onJob,
+    );
     progress.begin('recovering');
-    await recoverTiles(coordinator, tileWorkers, preparation, (share) => progress.report(share));
+    const helpers = tileWorkers.map((worker) => {
+      return { worker, isPrepared: isPrepared.get(worker) ?? Promise.resolve(false) };
+    });
+    await recoverTiles(coordinator, helpers, preparation, (share) => progress.report(share));
     const finished = await coordinator.call('finish', []);
     signal?.throwIfAborted();
     return new CoordinatedPhotograph(coordinator, {

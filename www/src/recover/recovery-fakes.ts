@@ -16,7 +16,7 @@ import type {
 import { RecoveryClient } from './recovery-client.js';
 
 type Response = WorkerResponse<SentError | null, RecoveryResult>;
-export type Answers = { readonly [M in keyof RecoveryCalls]?: (...args: never[]) => unknown };
+export type FakeAnswers = { readonly [M in keyof RecoveryCalls]?: (...args: never[]) => unknown };
 
 /** A watchdog that slow machines do not trigger. */
 export const LONG_LIMITS: WatchdogLimits = {
@@ -34,7 +34,7 @@ const CORRESPONDENCE = [
 export const TILES = 12;
 export const COLUMNS = 4;
 
-const ANSWERS: Answers = {
+const ANSWERS: FakeAnswers = {
   readFolder: () => ({
     width: 128,
     height: 96,
@@ -57,6 +57,8 @@ const ANSWERS: Answers = {
     rank: 20,
     expectedSnr: 12.34,
   }),
+  packInput: () => Uint8Array.of(1),
+  learn: () => undefined,
   pack: () => Uint8Array.of(1),
   packRows: (tileRow: number) => ({ first: 32 * tileRow, samples: Float32Array.of(tileRow) }),
   solveTile: (tile: number) => Uint8Array.of(tile),
@@ -82,9 +84,9 @@ export class FakeWorker implements RecoveryWorker {
   hasEnded = false;
   /** Requests of this method are not answered. */
   silentMethod: keyof RecoveryCalls | null = null;
-  answers: Answers;
+  answers: FakeAnswers;
 
-  constructor(answers: Answers = {}, startError: SentError | null = null) {
+  constructor(answers: FakeAnswers = {}, startError: SentError | null = null) {
     this.answers = { ...ANSWERS, ...answers };
     setImmediate(() => this.respond({ kind: 'done', id: START_ID, result: startError }));
   }
@@ -98,7 +100,7 @@ export class FakeWorker implements RecoveryWorker {
   postMessage(request: WorkerRequest<RecoveryTask>, transfer: Transferable[]): void {
     if (this.hasEnded) throw new Error('a worker that has ended gets no requests');
     // Detaches transferred buffers, as browsers do.
-    const { id, task } = structuredClone(request, { transfer: transfer as ArrayBuffer[] });
+    const { id, task } = structuredClone(request, { transfer: transfer as never[] });
     const { method, args } = task;
     this.log.push(method);
     if (method === this.silentMethod) return;

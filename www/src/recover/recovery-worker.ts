@@ -50,11 +50,11 @@ async function start() {
   const { memory } = await module.default();
   const progress = new TaskProgress();
   const coordinator = new Coordinator(module, progress.report);
-  const tileWorker = new TileWorker(module);
-  const answer = ({ method, args }: RecoveryTask): RecoveryResult => {
+  const tileWorker = new TileWorker(module, progress.report);
+  const answer = async ({ method, args }: RecoveryTask): Promise<RecoveryResult> => {
     const target = method in tileWorker ? tileWorker : coordinator;
     try {
-      return { value: (target as unknown as Methods)[method]?.(...args) };
+      return { value: await (target as unknown as Methods)[method]?.(...args) };
     } catch (thrown) {
       if (thrown instanceof WebAssembly.RuntimeError) {
         return { error: explainStop(thrown, memory), stopped: true };
@@ -63,7 +63,7 @@ async function start() {
       return { error: { code, message }, stopped: false };
     }
   };
-  return (task: RecoveryTask, onProgress: (steps: number) => void): RecoveryResult => {
+  return (task: RecoveryTask, onProgress: (steps: number) => void): Promise<RecoveryResult> => {
     progress.send = onProgress;
     return answer(task);
   };
@@ -78,8 +78,8 @@ serve(async () => {
   });
   return {
     ready: error,
-    handle: (task: RecoveryTask, onProgress) => {
-      const result = answer?.(task, onProgress) ?? { value: undefined };
+    handle: async (task: RecoveryTask, onProgress) => {
+      const result = (await answer?.(task, onProgress)) ?? { value: undefined };
       return [result, buffersOf(result)] as const;
     },
   };
