@@ -127,7 +127,7 @@ pub fn values(sums: &mut dyn Sums) -> Vec<f64> {
     values
 }
 
-/// Sets all sums to those of a list, as far as it goes.
+/// Sets all sums to those of a list of the same length.
 pub fn set_values(sums: &mut dyn Sums, values: &[f64]) {
     let mut values = values.iter();
     sums.visit(&mut |slice| {
@@ -138,9 +138,12 @@ pub fn set_values(sums: &mut dyn Sums, values: &[f64]) {
 
 /// Adds `other` to `sums`.
 pub fn add(sums: &mut dyn Sums, other: &mut dyn Sums) {
-    let mut total = values(sums);
-    add_scaled(&mut total, 1.0, &values(other));
-    set_values(sums, &total);
+    let others = values(other);
+    let mut others = others.iter();
+    sums.visit(&mut |slice| {
+        let pairs = slice.iter_mut().zip(&mut others);
+        pairs.for_each(|(sum, other)| *sum += *other);
+    });
 }
 
 /// The caller has cancelled the work, or a process of the group is lost.
@@ -206,4 +209,97 @@ fn add_pairs(nodes: Vec<PartialSum>) -> Vec<PartialSum> {
         added.push(right);
     }
     added
+}
+
+#[cfg(test)]
+pub(crate) mod test_group {
+    use std::sync::{Barrier, Mutex};
+
+    use super::*;
+
+    /// One of several processes that work together; here they are threads.
+    pub(crate) struct ThreadOfGroup<'a> {
+        rank: usize,
+        size: usize,
+        barrier: &'a Barrier,
+        /// By rank.
+        messages: &'a Mutex<Vec<Vec<Vec<u8>>>>,
+    }
+
+    impl Executor for ThreadOfGroup<'_> {
+        fn map<T: Send>(&self, count: usize, job: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+            SequentialExecutor.map(count, job)
+        }
+
+        fn own_jobs(&self, count: usize) -> Range<usize> {
+            self.rank * count / self.size..(self.rank + 1) * count / self.size
+        }
+
+        async fn exchange(&self, own: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>, Cancelled> {
+            self.messages.lock().unwrap()[self.rank] = own;
+            self.barrier.wait();
+            let all = self.messages.lock().unwrap().concat();
+            self.barrier.wait();
+            Ok(all)
+        }
+    }
+
+    /// Runs `work` in a group of `size` processes; returns the result of each.
+    pub(crate) fn run_in_group<R: Send>(
+        size: usize,
+        work: impl Fn(&ThreadOfGroup<'_>) -> R + Sync,
+    ) -> Vec<R> {
+        let (barrier, messages) = (Barrier::new(size), Mutex::new(vec![Vec::new(); size]));
+        std::thread::scope(|scope| {
+            let run = |rank| {
+                let (barrier, messages, work) = (&barrier, &messages, &work);
+                scope.spawn(move || {
+                    work(&ThreadOfGroup {
+                        rank,
+                        size,
+                        barrier,
+                        messages,
+                    })
+                })
+            };
+            let threads: Vec<_> = (0..size).map(run).collect();
+            let results = threads.into_iter().map(|thread| thread.join().unwrap());
+            results.collect()
+        })
+    }
+
+    #[test]
+    fn results_are_gathered_in_order_and_summed_to_the_same_bits() {
+        let values = |part: usize| [0.1, 1e16, -1e16].map(|x| x / (part + 1) as f64);
+        let total = |executor: &ThreadOfGroup<'_>| {
+            let zeros = || TwoLists([0.0; 2], vec![0.0]);
+            let job = |part: usize, sums: &mut TwoLists| {
+                let [a, b, c] = values(part);
+                sums.0 = [a, b];
+                sums.1 = vec![c];
+            };
+            let sums = pollster::block_on(executor.all_reduce(zeros, job)).unwrap();
+            let squares = executor.all_gather(11, |i| vec![i as f64; i % 3]);
+            let squares = pollster::block_on(squares).unwrap();
+            ([sums.0[0], sums.0[1], sums.1[0]].map(f64::to_bits), squares)
+        };
+        let alone = run_in_group(1, total).remove(0);
+        let gathered: Vec<_> = (0..11).map(|i| vec![i as f64; i % 3]).collect();
+        assert_eq!(alone.1, gathered);
+        let first = (0..PARTS).map(|part| values(part)[0]).sum::<f64>();
+        assert!((f64::from_bits(alone.0[0]) - first).abs() < 1e-12);
+        for size in 2..=11 {
+            let group = run_in_group(size, total);
+            assert!(group.iter().all(|one| *one == alone), "{size} processes");
+        }
+    }
+
+    struct TwoLists([f64; 2], Vec<f64>);
+
+    impl Sums for TwoLists {
+        fn visit(&mut self, visitor: &mut dyn FnMut(&mut [f64])) {
+            visitor(&mut self.0);
+            visitor(&mut self.1);
+        }
+    }
 }

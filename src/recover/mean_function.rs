@@ -34,7 +34,7 @@ pub(super) const MAX_SAMPLES: usize = MAX_SQUARES * (SQUARE_SIDE * SQUARE_SIDE) 
 
 /// Upper bound on the memory that [`mean_function`] takes, in bytes.
 pub(super) fn max_bytes(window: Window) -> usize {
-    (PARTS + 2) * window.area() * window.area() * size_of::<f64>()
+    (2 * PARTS + 2) * window.area() * window.area() * size_of::<f64>()
 }
 
 pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {

@@ -373,14 +373,16 @@ test('a recovery can be cancelled at any stage', async ({ openPage, step }) => {
 
 test('nothing is lost when a worker dies', async ({ openPage }) => {
   const page = await openPage('/plain', {
-    // The first worker that is to recover a tile gets a message that no page sends, and fails.
+    // The first worker with a task of the method `kill` gets a message that no page sends, and fails.
     before: () => {
-      Object.assign(globalThis, { killed: 0 });
+      Object.assign(globalThis, { kill: '', killed: [] });
       const send = Worker.prototype.postMessage;
       Worker.prototype.postMessage = function (/** @type {any[]} */ ...args) {
         const scope = /** @type {any} */ (globalThis);
-        if (args[0]?.task?.method === 'solveTile' && scope.killed === 0) {
-          scope.killed += 1;
+        const method = args[0]?.task?.method;
+        if (method !== undefined && method === scope.kill) {
+          scope.killed.push(method);
+          scope.kill = '';
           send.call(this, { id: 0 });
         }
         send.apply(this, /** @type {any} */ (args));
@@ -388,21 +390,23 @@ test('nothing is lost when a worker dies', async ({ openPage }) => {
     },
   });
   await prepareRecovery(page);
-  const [killed, disturbed, undisturbed] = await page.evaluate(async () => {
+  const [killed, ...files] = await page.evaluate(async () => {
     const scope = /** @type {any} */ (globalThis);
-    const recover = async () => {
+    const recover = async (kill = '', workers = 3) => {
       const input = { folder: scope.folder, shots: 30 };
       const settings = { method: 'nnls', window: 5 };
-      const recovered = await scope.recovery.recover(input, settings, { workers: 2 });
+      scope.kill = kill;
+      const recovered = await scope.recovery.recover(input, settings, { workers });
       const bytes = new Uint8Array(await (await recovered.toBlob('lossless')).arrayBuffer());
       recovered.free();
       return bytes.join();
     };
-    const disturbed = await recover();
-    return [scope.killed, disturbed, await recover()];
+    const disturbed = [await recover('prepareWith'), await recover('solveTile')];
+    return [scope.killed, await recover('', 1), await recover(), ...disturbed];
   });
-  expect(killed).toBe(1);
-  expect(disturbed === undisturbed).toBe(true);
+  expect(killed).toStrictEqual(['prepareWith', 'solveTile']);
+  const [alone] = files;
+  expect(files.map((file) => file === alone)).toStrictEqual([true, true, true, true]);
   await waitForWorkers(page, 0);
 });
 

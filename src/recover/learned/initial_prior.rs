@@ -120,14 +120,9 @@ fn normalise(x: &mut [f64]) -> f64 {
     norm
 }
 
-/// Keeps the `rank` eigenvectors of the prior's second moment, C + mmᵀ, with the largest eigenvalues: basis functions,
-/// `[rank, area]`, and the prior over them.
-pub(super) fn truncate_basis(
-    functions: &[f64],
-    prior: &Prior,
-    rank: usize,
-    area: usize,
-) -> (Vec<f64>, Prior) {
+/// The directions in which functions vary most: the eigenvectors of the prior's second moment, C + mmᵀ, `[r, r]`, the one
+/// with the largest eigenvalue first.
+pub(super) fn principal_axes(prior: &Prior) -> Vec<f64> {
     let full = prior.rank;
     let mut second_moment = prior.covariance.clone();
     for mean in &prior.means {
@@ -136,8 +131,19 @@ pub(super) fn truncate_basis(
             add_scaled(&mut second_moment[i * full..(i + 1) * full], share, mean);
         }
     }
-    let (_, vectors) = linalg::symmetric_eigen(second_moment, full);
-    let rotation = &vectors[..rank * full];
+    linalg::symmetric_eigen(second_moment, full).1
+}
+
+/// Keeps the first `rank` of the principal `axes`: basis functions, `[rank, area]`, and the prior over them.
+pub(super) fn truncate_basis(
+    functions: &[f64],
+    prior: &Prior,
+    axes: &[f64],
+    rank: usize,
+) -> (Vec<f64>, Prior) {
+    let full = prior.rank;
+    let area = functions.len() / full;
+    let rotation = &axes[..rank * full];
     let rotated = linalg::multiply(rotation, &prior.covariance, full, full);
     let covariance = linalg::multiply(&rotated, &linalg::transpose(rotation, full), full, rank);
     let mut truncated = Prior::new(&vec![0.0; rank], covariance);
@@ -178,7 +184,7 @@ mod tests {
             &[0.0, 2.0, 0.0],
             vec![1.0, 0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 4.0],
         );
-        let (kept, truncated) = truncate_basis(&functions, &prior, 2, 3);
+        let (kept, truncated) = truncate_basis(&functions, &prior, &principal_axes(&prior), 2);
         let expected = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
         for (function, expected) in kept.chunks_exact(3).zip(expected) {
             assert!(

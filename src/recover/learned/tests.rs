@@ -1,19 +1,15 @@
 //! Learned recovery of synthetic objects whose light transport functions are known.
 
-use std::ops::Range;
-use std::sync::{Barrier, Mutex};
-
 use super::basis::LearnedBasis;
 use super::equations::{ObservationEquations, PixelObservation};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
 use crate::capture::{CameraRowSet, NoiseModel, Pattern};
-use crate::job_executor::{Cancelled, Executor, SequentialExecutor};
+use crate::export;
+use crate::job_executor::test_group::run_in_group;
+use crate::job_executor::{Executor, SequentialExecutor};
 use crate::recover::sampling::pixels_by_window;
-use crate::recover::{
-    Method, PreparedRecovery, RecoverySettings, SparsityBasis, TailEstimate, WindowSizeEstimate,
-    mean_function,
-};
+use crate::recover::{Method, SparsityBasis, TailEstimate, WindowSizeEstimate, mean_function};
 use crate::transport::{
     CHANNELS, CameraPixel, Correspondence, Extent, TileTransportFunctions, Window,
 };
@@ -313,69 +309,29 @@ fn execution_order_does_not_change_the_result() {
     );
 }
 
-/// One of several processes that recover together; here they are threads.
-struct ThreadOfGroup<'a> {
-    rank: usize,
-    barrier: &'a Barrier,
-    /// By rank.
-    messages: &'a Mutex<Vec<Vec<Vec<u8>>>>,
-    size: usize,
-}
-
-impl Executor for ThreadOfGroup<'_> {
-    fn map<T: Send>(&self, count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        SequentialExecutor.map(count, work)
-    }
-
-    fn own_jobs(&self, count: usize) -> Range<usize> {
-        self.rank * count / self.size..(self.rank + 1) * count / self.size
-    }
-
-    async fn exchange(&self, own: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>, Cancelled> {
-        self.messages.lock().unwrap()[self.rank] = own;
-        self.barrier.wait();
-        let all = self.messages.lock().unwrap().concat();
-        self.barrier.wait();
-        Ok(all)
-    }
-}
-
 #[test]
 fn a_group_of_processes_prepares_the_same_recovery() {
     let (measurements, _) = measurements(30, 3);
-    let window = geometry().window;
-    let prepare = |method, executor: &ThreadOfGroup| {
-        let settings = RecoverySettings { method, window };
-        let recovery = PreparedRecovery::prepare(&measurements, settings, executor);
-        let recovery = pollster::block_on(recovery).unwrap();
-        let snr = recovery.holdout_validation().unwrap().snr().unwrap();
-        (postcard::to_allocvec(&recovery).unwrap(), snr.0.to_bits())
+    let prepare = |method, window, size| {
+        let prepared = run_in_group(size, |executor| {
+            let preparation = export::prepare(&measurements, method, window, executor);
+            let prepared = pollster::block_on(preparation).unwrap();
+            let snr = prepared.expected_snr().unwrap();
+            let recovery = postcard::to_allocvec(&prepared.recovery).unwrap();
+            (recovery, snr.0.to_bits())
+        });
+        assert!(prepared.iter().all(|one| *one == prepared[0]), "{size}");
+        prepared[0].clone()
     };
-    let prepare_in_group = |method, size| -> Vec<_> {
-        let (barrier, messages) = (Barrier::new(size), Mutex::new(vec![Vec::new(); size]));
-        std::thread::scope(|scope| {
-            let threads = (0..size).map(|rank| {
-                let thread = ThreadOfGroup {
-                    rank,
-                    barrier: &barrier,
-                    messages: &messages,
-                    size,
-                };
-                scope.spawn(move || prepare(method, &thread))
-            });
-            let threads: Vec<_> = threads.collect();
-            threads.into_iter().map(|t| t.join().unwrap()).collect()
-        })
-    };
-    for method in [
-        Method::Learned,
-        Method::Nnls,
-        Method::Bpdn(SparsityBasis::Identity),
+    let window = Some(geometry().window);
+    for (method, window, sizes) in [
+        (Method::Learned, window, &[2, 3][..]),
+        (Method::Nnls, None, &[2, 9]),
+        (Method::Bpdn(SparsityBasis::Identity), window, &[2]),
     ] {
-        let alone = &prepare_in_group(method, 1)[0];
-        for size in [2, 3] {
-            let group = prepare_in_group(method, size);
-            assert!(group.iter().all(|one| one == alone), "{method:?}, {size}");
+        let alone = prepare(method, window, 1);
+        for &size in sizes {
+            assert!(prepare(method, window, size) == alone, "{method:?}, {size}");
         }
     }
 }

@@ -11,7 +11,9 @@
 use super::basis::LearnedBasis;
 use super::equations::{ObservationEquations, with_margin};
 use super::inference::LearnedModel;
-use super::initial_prior::{MAX_INITIAL_RANK, initial_prior, smooth, truncate_basis};
+use super::initial_prior::{
+    MAX_INITIAL_RANK, initial_prior, principal_axes, smooth, truncate_basis,
+};
 use super::neighbour_prior::NeighbourPrior;
 use super::nnls_blending::centre;
 use super::nonnegativity::NonNegativityPenalty;
@@ -85,13 +87,14 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
         }
         drop(training);
 
+        let axes = principal_axes(&prior);
         let mut chosen: Option<(f64, LearnedModel)> = None;
         // A small window has fewer candidates.
         let mut ranks = CANDIDATE_RANKS.map(|rank| rank.min(prior.rank)).to_vec();
         ranks.dedup();
         for rank in ranks {
             self.executor.check_cancelled()?;
-            let (functions, prior) = truncate_basis(&functions, &prior, rank, mean.len());
+            let (functions, prior) = truncate_basis(&functions, &prior, &axes, rank);
             let model = LearnedModel {
                 geometry: self.geometry,
                 basis: LearnedBasis::new(&functions, &mean),

@@ -51,7 +51,11 @@ export function serve<Task, Ready, Result>(
       const [result, transfer] = await service.handle(task, onProgress);
       send({ kind: 'done', id, result }, transfer);
     };
-    scope.onmessage = ({ data }) => void orReport(() => answer(data));
+    // In order, also if an answer takes several turns of the event loop.
+    let last: Promise<void> = Promise.resolve();
+    scope.onmessage = ({ data }) => {
+      last = last.then(() => orReport(() => answer(data)));
+    };
     send({ kind: 'done', id: START_ID, result: service.ready });
   };
   scope.onmessage = ({ data }) => {

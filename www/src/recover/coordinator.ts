@@ -104,7 +104,7 @@ export class Coordinator implements Answers<CoordinatorCalls> {
   ): Promise<PreparationSummary> {
     const input = existing(this.#input);
     const { Recovery } = this.module;
-    const group = member ? new ConnectedGroup(member) : undefined;
+    const group = member ? new ConnectedGroup(member, () => this.report(0)) : undefined;
     try {
       const prepared = Recovery.prepare(input, method, basis, window, this.report, group);
       this.#recovery = await prepared;

@@ -13,6 +13,8 @@ const MAX_DEFAULT_WORKERS = 4;
 const TILE_SIDE = 32;
 const HALO = 8;
 const PIXEL_BYTES = 12;
+/** Of the preparation, what every worker of a group does. */
+const UNDIVIDED_SHARE = 0.25;
 
 const MAX_DEFAULT_MEMORY_BYTES = 2 ** 30;
 /** Share of the device's memory. */
@@ -73,26 +75,31 @@ function memoryBytes(
   const measurements = PIXEL_BYTES * photographs * pixels + patterns;
   const all = workers * each + measurements + 4 * pixels * area;
   const strips = 2 * PIXEL_BYTES * photographs * rows + patterns;
-  // Measurements are packed before they are sent.
-  const packed = measurements + 2 * (workers - 1) * measurements;
+  // Measurements are packed before they are sent, and each worker has the packed ones for a while: in its memory, and as
+  // JavaScript's array. Those of the coordinator grow by doubling.
+  const packed = 3 * measurements + 3 * (workers - 1) * measurements;
   return { alone: all + (workers - 1) * strips, together: workers > 1 ? all + packed : all };
 }
 
 /** Expected time of each stage of `recover`. */
 export function stageSeconds(
-  { width, height, photographs }: RecoverySize,
+  size: RecoverySize,
   settings: RecoverySettings,
-  { workers = defaultWorkers() }: Pick<RecoverOptions, 'workers'>,
+  options: Pick<RecoverOptions, 'workers' | 'memoryLimit'>,
 ): StageSeconds {
+  const { width, height, photographs } = size;
+  const { workers = defaultWorkers() } = options;
   const area = windowArea(settings);
   const pixels = width * height;
   const samples = pixels * photographs;
   const { method = 'learned' } = settings;
   const perPixel = { learned: 2e-4, nnls: 3e-4, bpdn: 3e-3 }[method] * (area / 225);
-  const preparing = (method === 'learned' ? 1.5 : 0.5) * (area / 225);
+  const alone = (method === 'learned' ? 4 : 1.5) * (area / 225) + 2e-8 * samples;
+  const together = UNDIVIDED_SHARE + (1 - UNDIVIDED_SHARE) / workers;
+  const preparing = alone * (preparesTogether(size, settings, options) ? together : 1);
   return [
     ['reading', 0.1 + 1e-7 * samples],
-    ['preparing', preparing + 2e-8 * samples],
+    ['preparing', preparing],
     ['recovering', 0.1 + (perPixel * pixels) / workers],
   ];
 }

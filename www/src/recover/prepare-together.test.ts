@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { prepareTogether } from './prepare-together.js';
-import { ConnectedGroup, createGroup } from './process-group.js';
+import { ConnectedGroup, createGroup, type GroupMembership } from './process-group.js';
 import { FakeWorker, fakeClient, settle } from './recovery-fakes.js';
 
 const SETTINGS = { method: 'learned', basis: undefined, window: 15 } as const;
@@ -13,10 +13,12 @@ function prepare(coordinator: FakeWorker, workers: readonly FakeWorker[]) {
   return { done, clients };
 }
 
-/** Connects a group; what each worker gets must come from the others, in their order. */
+let waiting = (): void => {};
+
+/** Connects a group; its workers call `waiting` while they wait. */
 function connect(size: number) {
   const group = createGroup(size);
-  const workers = group.members.map((member) => new ConnectedGroup(member));
+  const workers = group.members.map((member) => new ConnectedGroup(member, () => waiting()));
   return { group, workers };
 }
 
@@ -74,22 +76,72 @@ test('workers prepare with the coordinator, which has no part in a group alone',
   );
 });
 
-test('if a worker is lost, the coordinator prepares alone', async () => {
+test('if a worker is lost, the coordinator prepares alone, and the others live on', async () => {
   const dying = new FakeWorker();
-  dying.silentMethod = 'learn';
-  let attempts = 0;
+  dying.silentMethod = 'prepareWith';
+  const other = new FakeWorker({
+    prepareWith: () => {
+      throw { code: 'worker-unavailable', message: 'lost' };
+    },
+  });
+  const members: unknown[] = [];
   const coordinator = new FakeWorker({
     prepare: (_: unknown, member: unknown) => {
-      attempts += 1;
+      members.push(member);
       if (member) throw { code: 'worker-unavailable', message: 'lost' };
       return { tiles: 1 };
     },
   });
-  const { done } = prepare(coordinator, [dying]);
+  const { done, clients } = prepare(coordinator, [dying, other]);
   await settle();
+  dying.crash();
   const { summary, isPrepared } = await done;
-  assert.deepEqual([attempts, summary.tiles, isPrepared.size], [2, 1, 0]);
-  assert.ok(dying.hasEnded);
+  assert.deepEqual([members.length, members[1], summary.tiles], [2, null, 1]);
+  assert.deepEqual(await Promise.all(clients.map((client) => isPrepared.get(client))), [
+    false,
+    false,
+  ]);
+  assert.deepEqual([dying.hasEnded, other.hasEnded], [true, false]);
+});
+
+test('a worker that finds a fault of the input does not end the group', async () => {
+  const fault = { code: 'recover-mismatch', message: 'shots[3]' };
+  let control: MessagePort | undefined;
+  const coordinator = new FakeWorker({
+    prepare: (_: unknown, member: GroupMembership) => {
+      control = member.control;
+      return {};
+    },
+  });
+  const worker = new FakeWorker({
+    prepareWith: () => {
+      throw fault;
+    },
+  });
+  const { done, clients } = prepare(coordinator, [worker]);
+  const { isPrepared } = await done;
+  assert.equal(await isPrepared.get(clients[0]), false);
+  let messages = 0;
+  control?.addEventListener('message', () => {
+    messages += 1;
+  });
+  control?.start();
+  await settle();
+  assert.equal(messages, 0);
+  control?.close();
+});
+
+test('a worker that waits for others says so', async () => {
+  const { group, workers } = connect(2);
+  const reported = new Promise<void>((resolve) => {
+    waiting = resolve;
+  });
+  const [worker] = workers as [ConnectedGroup];
+  const pending = worker.exchange([]);
+  await reported;
+  group.end();
+  await assert.rejects(pending, /lost/);
+  for (const each of workers) each.close();
 });
 
 test('a fault of the input is not prepared again', async () => {

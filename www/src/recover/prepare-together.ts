@@ -5,7 +5,10 @@ import { createGroup, type GroupMembership, portsOf } from './process-group.js';
 import type { PreparationSettings, PreparationSummary } from './protocol.js';
 import type { RecoveryClient } from './recovery-client.js';
 
-type Client = Pick<RecoveryClient, 'call' | 'terminate'>;
+type Client = Pick<RecoveryClient, 'call'>;
+
+/** Codes of what is wrong with a worker, and not with the input that all share. */
+const WORKERS_FAULTS: readonly string[] = ['worker-unavailable', 'recover-memory', 'internal'];
 
 export interface CommonPreparation {
   readonly summary: PreparationSummary;
@@ -14,8 +17,8 @@ export interface CommonPreparation {
 }
 
 /**
- * `onJob` is called while the coordinator works. If a worker is lost, it and the rest of the group are ended, and the
- * coordinator prepares alone. Rejects if the coordinator fails.
+ * `onJob` is called while the coordinator works. If another worker is lost, the coordinator prepares again alone. Rejects if
+ * the coordinator fails.
  */
 export async function prepareTogether(
   coordinator: Client,
@@ -23,37 +26,36 @@ export async function prepareTogether(
   settings: PreparationSettings,
   onJob: () => void,
 ): Promise<CommonPreparation> {
-  const alone = async (): Promise<CommonPreparation> => {
-    const summary = await coordinator.call('prepare', [settings, null], { onProgress: onJob });
-    return { summary, isPrepared: new Map() };
+  const isPrepared = new Map<unknown, Promise<boolean>>();
+  const prepare = async (
+    member: GroupMembership | null,
+    transfer: MessagePort[],
+  ): Promise<CommonPreparation> => {
+    const options = { transfer, onProgress: onJob };
+    return { summary: await coordinator.call('prepare', [settings, member], options), isPrepared };
   };
-  if (workers.length === 0) return alone();
+  if (workers.length === 0) return prepare(null, []);
   const packed = await coordinator.call('packInput', []);
   const group = createGroup(workers.length + 1);
-  const [own, ...others] = group.members;
-  if (!own) return alone();
-  const isPrepared = new Map<unknown, Promise<boolean>>();
-  for (const [i, worker] of workers.entries()) {
-    const member = others[i] as GroupMembership;
-    const transfer = portsOf(member);
-    const learned = worker.call('learn', [packed, settings, member], { transfer });
-    const onFailure = () => {
-      group.end();
-      return false;
-    };
-    isPrepared.set(
-      worker,
-      learned.then(() => true, onFailure),
+  const [own, ...others] = group.members as [GroupMembership, ...GroupMembership[]];
+  for (const [i, member] of others.entries()) {
+    const worker = workers[i] as Client;
+    const options = { transfer: portsOf(member) };
+    const prepared = worker.call('prepareWith', [packed, settings, member], options).then(
+      () => true,
+      (thrown: unknown) => {
+        // The coordinator finds faults of the input as well.
+        if (WORKERS_FAULTS.includes(toPhotoError(thrown).code)) group.end();
+        return false;
+      },
     );
+    isPrepared.set(worker, prepared);
   }
+  void Promise.all(isPrepared.values()).then(() => group.close());
   try {
-    const options = { transfer: portsOf(own), onProgress: onJob };
-    const summary = await coordinator.call('prepare', [settings, own], options);
-    return { summary, isPrepared };
+    return await prepare(own, portsOf(own));
   } catch (thrown) {
-    const isCoordinatorsFault = toPhotoError(thrown).code !== 'worker-unavailable';
-    if (isCoordinatorsFault) throw thrown;
-    for (const worker of workers) worker.terminate();
-    return await alone();
+    if (toPhotoError(thrown).code !== 'worker-unavailable') throw thrown;
+    return await prepare(null, []);
   }
 }

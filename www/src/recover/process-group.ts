@@ -15,9 +15,12 @@ export interface GroupMembership {
 
 /** The page's side of a group. */
 export interface CreatedGroup {
+  /** In the order of their ranks. */
   readonly members: readonly GroupMembership[];
   /** Exchanges reject from now on: a worker is lost. */
   end(): void;
+  /** Releases the page's ports. */
+  close(): void;
 }
 
 export function createGroup(size: number): CreatedGroup {
@@ -38,6 +41,9 @@ export function createGroup(size: number): CreatedGroup {
     members,
     end(): void {
       for (const { port1 } of controls) port1.postMessage(null);
+    },
+    close(): void {
+      for (const { port1 } of controls) port1.close();
     },
   };
 }
@@ -70,6 +76,9 @@ class Inbox {
   }
 }
 
+/** While a worker waits for others, it says so to the page, whose watchdog then gives up the worker that is silent. */
+const WAITING_REPORT_MS = 1000;
+
 /** A worker's side of a group. */
 export class ConnectedGroup implements ProcessGroup {
   readonly rank: number;
@@ -79,7 +88,11 @@ export class ConnectedGroup implements ProcessGroup {
   readonly #inboxes: readonly Inbox[];
   #hasEnded = false;
 
-  constructor({ rank, ports, control }: GroupMembership) {
+  /** `reportWaiting` is called while it waits for other workers. */
+  constructor(
+    { rank, ports, control }: GroupMembership,
+    private readonly reportWaiting: () => void,
+  ) {
     this.rank = rank;
     this.size = ports.length + 1;
     this.#ports = ports;
@@ -87,6 +100,7 @@ export class ConnectedGroup implements ProcessGroup {
     this.#inboxes = ports.map((port) => {
       const inbox = new Inbox();
       port.onmessage = ({ data }) => inbox.put(data);
+      port.onmessageerror = () => this.#end();
       return inbox;
     });
     control.onmessage = () => this.#end();
@@ -95,7 +109,9 @@ export class ConnectedGroup implements ProcessGroup {
   async exchange(own: Uint8Array[]): Promise<Uint8Array[]> {
     if (this.#hasEnded) throw lost();
     for (const port of this.#ports) port.postMessage(own);
-    const others = await Promise.all(this.#inboxes.map((inbox) => inbox.take()));
+    const reports = setInterval(this.reportWaiting, WAITING_REPORT_MS);
+    const taken = Promise.all(this.#inboxes.map((inbox) => inbox.take()));
+    const others = await taken.finally(() => clearInterval(reports));
     return [...others.slice(0, this.rank), own, ...others.slice(this.rank)].flat();
   }
 

@@ -97,9 +97,9 @@ export interface CoordinatorCalls {
   addGrayCode(axis: 'x' | 'y', bit: number, inverted: boolean, photograph: SentPicture): void;
   addShot(index: number, pattern: SentPicture, photograph: SentPicture, exposure: number): void;
   finishPictures(): InputSummary;
-  /** For `learn` of a tile worker. */
+  /** For `prepareWith` of a tile worker. */
   packInput(): Uint8Array;
-  /** In a group with tile workers that `learn`, or alone. Reports the jobs that are done. */
+  /** In a group with tile workers, which `prepareWith` it, or alone. Reports the jobs that are done. */
   prepare(settings: PreparationSettings, member: GroupMembership | null): PreparationSummary;
   /** For `unpack` of a tile worker. */
   pack(): Uint8Array;
@@ -127,7 +127,7 @@ export interface CoordinatorCalls {
 
 export interface TileWorkerCalls {
   /** Prepares the recovery together with the coordinator; no need then to `unpack` and `setRows`. */
-  learn(packed: Uint8Array, settings: PreparationSettings, member: GroupMembership): void;
+  prepareWith(packed: Uint8Array, settings: PreparationSettings, member: GroupMembership): void;
   unpack(packed: Uint8Array): void;
   setRows(rows: PackedRows): void;
   /** The tile's record, for `putTile` of the coordinator. */

@@ -70,7 +70,7 @@ export async function runRecovery(
   };
   signal?.addEventListener('abort', end);
   try {
-    const stages = stageSeconds(size ?? UNKNOWN_SIZE, settings, { workers });
+    const stages = stageSeconds(size ?? UNKNOWN_SIZE, settings, { workers, memoryLimit });
     const progress = new ProgressTracker(stages, onProgress);
     progress.begin('reading');
     for (let i = 0; i < workers; i += 1) {
@@ -92,6 +92,7 @@ export async function runRecovery(
     const group = hasMemory ? started : [];
     const { summary: preparation, isPrepared } = await prepareTogether(
       coordinator,
+      // Those that start later recover tiles only.
       [...group],
       preparationInput,
       onJob,

@@ -58,7 +58,7 @@ const ANSWERS: FakeAnswers = {
     expectedSnr: 12.34,
   }),
   packInput: () => Uint8Array.of(1),
-  learn: () => undefined,
+  prepareWith: () => undefined,
   pack: () => Uint8Array.of(1),
   packRows: (tileRow: number) => ({ first: 32 * tileRow, samples: Float32Array.of(tileRow) }),
   solveTile: (tile: number) => Uint8Array.of(tile),

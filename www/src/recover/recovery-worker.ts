@@ -3,6 +3,7 @@
 import { loadRecovery } from '../engine/recovery-module.js';
 import { serve } from '../engine/worker-server.js';
 import { messageOf, toPhotoError } from '../shared/errors.js';
+import { Deferred } from '../shared/promises.js';
 import { Coordinator } from './coordinator.js';
 import type { RecoveryResult, RecoveryTask, SentError } from './protocol.js';
 import { TileWorker } from './tile-worker.js';
@@ -26,6 +27,17 @@ class TaskProgress {
     this.#lastMs = now;
     this.send(steps);
   };
+}
+
+/** Rejects once the module stops in a later turn of the event loop, where nothing else catches it. */
+function stopOfModule(): { readonly stopped: Promise<never>; readonly release: () => void } {
+  const { promise, reject } = new Deferred<never>();
+  const onError = (event: ErrorEvent): void => {
+    event.preventDefault();
+    reject(event.error);
+  };
+  globalThis.addEventListener('error', onError);
+  return { stopped: promise, release: () => globalThis.removeEventListener('error', onError) };
 }
 
 function explainStop(thrown: unknown, { buffer }: Memory): SentError {
@@ -53,14 +65,18 @@ async function start() {
   const tileWorker = new TileWorker(module, progress.report);
   const answer = async ({ method, args }: RecoveryTask): Promise<RecoveryResult> => {
     const target = method in tileWorker ? tileWorker : coordinator;
+    const { stopped, release } = stopOfModule();
     try {
-      return { value: await (target as unknown as Methods)[method]?.(...args) };
+      const value = (target as unknown as Methods)[method]?.(...args);
+      return { value: await Promise.race([value, stopped]) };
     } catch (thrown) {
       if (thrown instanceof WebAssembly.RuntimeError) {
         return { error: explainStop(thrown, memory), stopped: true };
       }
       const { code, message } = toPhotoError(thrown);
       return { error: { code, message }, stopped: false };
+    } finally {
+      release();
     }
   };
   return (task: RecoveryTask, onProgress: (steps: number) => void): Promise<RecoveryResult> => {

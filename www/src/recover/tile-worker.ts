@@ -16,18 +16,18 @@ export class TileWorker implements Answers<TileWorkerCalls> {
     private readonly report: (steps: number) => void,
   ) {}
 
-  async learn(
+  async prepareWith(
     packed: Uint8Array,
     { method, basis, window }: PreparationSettings,
     member: GroupMembership,
   ): Promise<void> {
     const { MeasurementInput, Recovery } = this.module;
-    const group = new ConnectedGroup(member);
+    const group = new ConnectedGroup(member, () => this.report(0));
+    const input = MeasurementInput.unpack(packed);
     try {
-      const input = MeasurementInput.unpack(packed);
       this.#recovery = await Recovery.prepare(input, method, basis, window, this.report, group);
-      input.free();
     } finally {
+      input.free();
       group.close();
     }
   }
