@@ -7,7 +7,7 @@ import type { RecoveryClient } from './recovery-client.js';
 
 type Client = Pick<RecoveryClient, 'call'>;
 
-/** Codes of what is wrong with a worker, and not with the input that all share. */
+/** Codes of a worker's own faults. All workers find the faults of the input. */
 const WORKERS_FAULTS: readonly string[] = ['worker-unavailable', 'recover-memory', 'internal'];
 
 export interface CommonPreparation {
