@@ -5,11 +5,9 @@ use super::equations::{ObservationEquations, PixelObservation};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
 use crate::capture::{CameraRowSet, NoiseModel, Pattern};
-use crate::export;
-use crate::job_executor::test_group::run_in_group;
 use crate::job_executor::{Executor, SequentialExecutor};
 use crate::recover::sampling::pixels_by_window;
-use crate::recover::{Method, SparsityBasis, TailEstimate, WindowSizeEstimate, mean_function};
+use crate::recover::{TailEstimate, WindowSizeEstimate, mean_function};
 use crate::transport::{
     CHANNELS, CameraPixel, Correspondence, Extent, TileTransportFunctions, Window,
 };
@@ -310,33 +308,6 @@ fn execution_order_does_not_change_the_result() {
 }
 
 #[test]
-fn a_group_of_processes_prepares_the_same_recovery() {
-    let (measurements, _) = measurements(30, 3);
-    let prepare = |method, window, size| {
-        let prepared = run_in_group(size, |executor| {
-            let preparation = export::prepare(&measurements, method, window, executor);
-            let prepared = pollster::block_on(preparation).unwrap();
-            let snr = prepared.expected_snr().unwrap();
-            let recovery = postcard::to_allocvec(&prepared.recovery).unwrap();
-            (recovery, snr.0.to_bits())
-        });
-        assert!(prepared.iter().all(|one| *one == prepared[0]), "{size}");
-        prepared[0].clone()
-    };
-    let window = Some(geometry().window);
-    for (method, window, sizes) in [
-        (Method::Learned, window, &[2, 3][..]),
-        (Method::Nnls, None, &[2, 9]),
-        (Method::Bpdn(SparsityBasis::Identity), window, &[2]),
-    ] {
-        let alone = prepare(method, window, 1);
-        for &size in sizes {
-            assert!(prepare(method, window, size) == alone, "{method:?}, {size}");
-        }
-    }
-}
-
-#[test]
 fn training_uses_pixels_with_saturated_samples() {
     let geometry = geometry();
     let (mut measurements, tau) = measurements(20, 7);
@@ -553,5 +524,41 @@ fn rgb_patterns_with_equal_channels_equal_grey_patterns() {
             a.observations[index].brightness,
             b.observations[index].brightness
         );
+    }
+}
+
+/// Browsers' tests have no threads to stand for processes.
+#[cfg(not(target_arch = "wasm32"))]
+mod in_groups {
+    use super::*;
+    use crate::export;
+    use crate::job_executor::test_group::run_in_group;
+    use crate::recover::{Method, SparsityBasis};
+
+    #[test]
+    fn a_group_of_processes_prepares_the_same_recovery() {
+        let (measurements, _) = measurements(30, 3);
+        let prepare = |method, window, size| {
+            let prepared = run_in_group(size, |executor| {
+                let preparation = export::prepare(&measurements, method, window, executor);
+                let prepared = pollster::block_on(preparation).unwrap();
+                let snr = prepared.expected_snr().unwrap();
+                let recovery = postcard::to_allocvec(&prepared.recovery).unwrap();
+                (recovery, snr.0.to_bits())
+            });
+            assert!(prepared.iter().all(|one| *one == prepared[0]), "{size}");
+            prepared[0].clone()
+        };
+        let window = Some(geometry().window);
+        for (method, window, sizes) in [
+            (Method::Learned, window, &[2, 3][..]),
+            (Method::Nnls, None, &[2, 9]),
+            (Method::Bpdn(SparsityBasis::Identity), window, &[2]),
+        ] {
+            let alone = prepare(method, window, 1);
+            for &size in sizes {
+                assert!(prepare(method, window, size) == alone, "{method:?}, {size}");
+            }
+        }
     }
 }
