@@ -108,6 +108,11 @@ pub trait Executor: Sync {
     }
 }
 
+/// Of `count` jobs, the share of process number `rank` in a group of `size`.
+pub fn share_of_jobs(count: usize, rank: usize, size: usize) -> Range<usize> {
+    rank * count / size..(rank + 1) * count / size
+}
+
 /// Sums, which can be added to others of the same lengths.
 pub trait Sums {
     /// Visits all, in the same order each time.
@@ -232,7 +237,7 @@ pub(crate) mod test_group {
         }
 
         fn own_jobs(&self, count: usize) -> Range<usize> {
-            self.rank * count / self.size..(self.rank + 1) * count / self.size
+            share_of_jobs(count, self.rank, self.size)
         }
 
         async fn exchange(&self, own: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>, Cancelled> {

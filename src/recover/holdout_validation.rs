@@ -75,37 +75,39 @@ impl HoldoutValidation {
             return Ok(None);
         }
         let rects = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
+        let samples = |i: usize| prediction::samples(measurements, &split.held_out, rects[i]);
+        let samples = executor.map(rects.len(), samples);
         let own = executor.own_jobs(rects.len());
-        let squares = executor.map(own.len(), |i| {
-            let rect = rects[own.start + i];
-            let square = ValidationRegion {
-                tile: recover_from_training(rect),
-                measurements: prediction::samples(measurements, &split.held_out, rect),
-            };
-            let functions = square.tile.functions(&geometry, basis);
-            let residual = square.residual_variance(&geometry, &held_out, &functions);
-            let (signal, noise) = variances(measurements, split, rect);
-            (square, [signal, noise, residual])
+        let squares = executor.map(own.len(), |j| {
+            let i = own.start + j;
+            let tile = recover_from_training(rects[i]);
+            let functions = tile.functions(&geometry, basis);
+            let residual = residual_variance(&samples[i], &geometry, &held_out, &functions);
+            let (signal, noise) = variances(measurements, split, rects[i]);
+            (tile, [signal, noise, residual])
         });
         let square = |i: usize| &squares[i - own.start];
         let variances = executor.all_gather(rects.len(), |i| vec![square(i).1]);
         let variances = variances.await?.concat();
         let [signal, noise, residual] =
             [0, 1, 2].map(|i| variances.iter().map(|variances| variances[i]).sum());
-        let coefficients = |i: usize| square(i).0.tile.coefficients.clone();
+        let coefficients = |i: usize| square(i).0.coefficients.clone();
         let coefficients = executor.all_gather(rects.len(), coefficients).await?;
-        let functions = |i: usize| square(i).0.tile.functions.clone();
+        let functions = |i: usize| square(i).0.functions.clone();
         let functions = executor.all_gather(rects.len(), functions).await?;
-        let samples = |rect| prediction::samples(measurements, &split.held_out, rect);
-        let tiles = coefficients.into_iter().zip(functions).zip(&rects);
-        let squares = tiles.map(|((coefficients, functions), &rect)| ValidationRegion {
-            tile: FloatTile {
-                rect,
-                coefficients,
-                functions,
-            },
-            measurements: samples(rect),
-        });
+        let tiles = coefficients.into_iter().zip(functions).zip(rects);
+        let squares = tiles.zip(samples);
+        let squares =
+            squares.map(
+                |(((coefficients, functions), rect), measurements)| ValidationRegion {
+                    tile: FloatTile {
+                        rect,
+                        coefficients,
+                        functions,
+                    },
+                    measurements,
+                },
+            );
         Ok(Some(Self {
             geometry,
             squares: squares.collect(),
@@ -151,30 +153,34 @@ impl HoldoutValidation {
     fn residual_variance(&self, functions: &[TileTransportFunctions]) -> f64 {
         let squares = self.squares.iter().zip(functions);
         let variances = squares.map(|(square, functions)| {
-            square.residual_variance(&self.geometry, &self.patterns, functions)
+            residual_variance(
+                &square.measurements,
+                &self.geometry,
+                &self.patterns,
+                functions,
+            )
         });
         variances.sum()
     }
 }
 
-impl ValidationRegion {
-    /// Variance of the residuals of `functions` between held-out `patterns`, summed over pixels and channels.
-    fn residual_variance(
-        &self,
-        geometry: &Geometry,
-        patterns: &[Pattern],
-        functions: &TileTransportFunctions,
-    ) -> f64 {
-        let predictions = prediction::predictions(geometry, patterns, functions);
-        let residuals = self.measurements.iter().zip(&predictions);
-        let residuals: Vec<f64> = residuals.map(|(y, predicted)| y - predicted).collect();
-        let pixels = residuals.chunks_exact(patterns.len() * CHANNELS);
-        let variances = pixels.flat_map(|residuals| {
-            let of_channel = |c| residuals.iter().skip(c).step_by(CHANNELS).copied();
-            (0..CHANNELS).filter_map(move |c| variance(of_channel(c)))
-        });
-        variances.sum()
-    }
+/// Variance of the residuals of `functions` between held-out `patterns`, summed over pixels and channels; `measurements` are
+/// `[pixel, pattern, channel]`.
+fn residual_variance(
+    measurements: &[f64],
+    geometry: &Geometry,
+    patterns: &[Pattern],
+    functions: &TileTransportFunctions,
+) -> f64 {
+    let predictions = prediction::predictions(geometry, patterns, functions);
+    let residuals = measurements.iter().zip(&predictions);
+    let residuals: Vec<f64> = residuals.map(|(y, predicted)| y - predicted).collect();
+    let pixels = residuals.chunks_exact(patterns.len() * CHANNELS);
+    let variances = pixels.flat_map(|residuals| {
+        let of_channel = |c| residuals.iter().skip(c).step_by(CHANNELS).copied();
+        (0..CHANNELS).filter_map(move |c| variance(of_channel(c)))
+    });
+    variances.sum()
 }
 
 /// Variances between patterns, summed over pixels and channels: of the measurements less their noise, and of the noise

@@ -79,7 +79,7 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
             self.equations(&basis, &self.split.training, squares[i])
         });
         let training = training.await?;
-        let min_brightness = training.min_reliable_brightness;
+        let min_brightness = training.min_reliable_brightness(self.executor).await?;
         for step in INITIAL_EM_STEPS {
             self.executor.check_cancelled()?;
             let iteration = prior.em_iteration(&training, &min_brightness, step, self.executor);

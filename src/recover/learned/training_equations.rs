@@ -6,13 +6,12 @@ use crate::recover::partition::Partition;
 use crate::recover::preparation_input::RecoveryPreparationInput;
 
 /// If at least one in so many observations has a full window, the others are left out.
-const FULL_WINDOW_RATIO: usize = 4;
+const FULL_WINDOW_RATIO: u64 = 4;
 
-/// The equations of regions of the picture, and what depends on all of them.
+/// The equations of regions of the picture.
 #[derive(Debug)]
 pub(super) struct TrainingEquations {
     pub regions: Partition<ObservationEquations>,
-    pub min_reliable_brightness: MinReliableBrightness,
     /// Whether observations whose window is partly outside the light plane are left out: they determine little of their
     /// functions and slow EM down.
     pub only_full_windows: bool,
@@ -30,23 +29,35 @@ impl TrainingEquations {
     ) -> Result<Self, Cancelled> {
         let executor = preparation.executor;
         let regions = Partition::new(executor, count, region);
-        let observations_of_part = |part: usize| {
+        let counts_of_part = |part: usize| {
             let observations = regions.part(part).iter().flat_map(|r| &r.observations);
-            let described = observations.map(|o| [o.brightness, f64::from(o.has_full_window)]);
-            described.collect::<Vec<_>>()
+            let full_windows = observations.clone().filter(|o| o.has_full_window).count();
+            vec![[full_windows, observations.count()].map(|count| count as u64)]
         };
-        let observations = executor.all_gather(PARTS, observations_of_part).await?;
-        let observations = observations.concat();
-        let full_windows = observations.iter().filter(|[_, full]| *full > 0.0).count();
-        let brightnesses: Vec<f64> = observations
-            .iter()
-            .map(|[brightness, _]| *brightness)
-            .collect();
+        let counts = executor.all_gather(PARTS, counts_of_part).await?.concat();
+        let [full_windows, all] =
+            [0, 1].map(|i| counts.iter().map(|counts| counts[i]).sum::<u64>());
         Ok(Self {
             regions,
-            min_reliable_brightness: min_reliable_brightness(&brightnesses),
-            only_full_windows: FULL_WINDOW_RATIO * full_windows >= brightnesses.len(),
+            only_full_windows: FULL_WINDOW_RATIO * full_windows >= all,
         })
+    }
+
+    /// The brightness below which the observations are not reliable.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub async fn min_reliable_brightness(
+        &self,
+        executor: &impl Executor,
+    ) -> Result<MinReliableBrightness, Cancelled> {
+        let brightnesses_of_part = |part: usize| {
+            let regions = self.regions.part(part).iter();
+            let observations = regions.flat_map(|r| &r.observations);
+            observations.map(|o| o.brightness).collect::<Vec<_>>()
+        };
+        let brightnesses = executor.all_gather(PARTS, brightnesses_of_part).await?;
+        Ok(min_reliable_brightness(&brightnesses.concat()))
     }
 
     /// The equations of one region, of which every observation counts.
@@ -54,7 +65,6 @@ impl TrainingEquations {
     pub fn of_region(equations: ObservationEquations) -> Self {
         Self {
             regions: Partition::single(equations),
-            min_reliable_brightness: MinReliableBrightness::default(),
             only_full_windows: false,
         }
     }

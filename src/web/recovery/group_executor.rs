@@ -7,7 +7,7 @@ use js_sys::{Array, Uint8Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::job_executor::{Cancelled, Executor};
+use crate::job_executor::{Cancelled, Executor, share_of_jobs};
 use crate::web::progress::ReportingExecutor;
 
 #[wasm_bindgen]
@@ -75,7 +75,7 @@ impl Executor for GroupExecutor {
     }
 
     fn own_jobs(&self, count: usize) -> Range<usize> {
-        self.rank * count / self.size..(self.rank + 1) * count / self.size
+        share_of_jobs(count, self.rank, self.size)
     }
 
     async fn exchange(&self, own: Vec<Vec<u8>>) -> Result<Vec<Vec<u8>>, Cancelled> {
