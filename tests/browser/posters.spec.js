@@ -142,7 +142,7 @@ test.describe('a poster', () => {
     const page = await openPhoto({ ...GLASS, poster: '/no-poster.png', reveal: 'manual' });
     for (let i = 1; i < 9; i += 1) await page.evaluate(`photo.torch = { x: ${i / 9}, y: 0.5 }`);
     expect(server.requestedRanges.get('/no-poster.png')?.length).toBe(1);
-    expect(await isPosterVisible(page)).toBe(false);
+    await expect.poll(() => isPosterVisible(page)).toBe(false);
   });
 });
 
