@@ -109,6 +109,14 @@ impl ManifestLight {
         Extent::new(self.width, self.height)
     }
 
+    /// A light plane of this gamma, without a size.
+    pub fn of_gamma(gamma: f64) -> Self {
+        Self {
+            gamma: Some(gamma),
+            ..Self::default()
+        }
+    }
+
     /// Exactly one of gamma and response must be given, and be usable.
     fn check(&self) -> Result<(), CaptureErrorKind> {
         match (&self.response, self.gamma) {

@@ -15,7 +15,7 @@ mod tile_record;
 pub use capture_remedy::capture_remedy;
 pub use encoding::{FileQuality, encode_file, file_geometry, file_tile};
 pub use memory_plan::{MemoryPlan, TooLittleMemory};
-pub use metadata::metadata;
+pub use metadata::{Provenance, metadata};
 pub use preparation::{
     MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation, prepare, saturated_percent,
 };

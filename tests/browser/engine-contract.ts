@@ -3,16 +3,21 @@
  * against. Needs pkg-scripts/build to have run.
  */
 
+import type * as CaptureReaders from '../../dist/wasm/capture_reader.js';
 import type * as Cpu from '../../dist/wasm/cpu.js';
 import type * as Decoders from '../../dist/wasm/decoder.js';
 import type * as Recoveries from '../../dist/wasm/recovery.js';
 import type * as WebGl2 from '../../dist/wasm/webgl2.js';
 import type * as WebGpu from '../../dist/wasm/webgpu.js';
 import type {
+  CaptureReader,
+  CaptureReaderModule,
   LinearPng,
+} from '../../www/src/engine/capture-reader-exports.js';
+import type {
+  CaptureBuilder,
   MeasurementBuilder,
   MeasurementInput,
-  PageFiles,
   RecoveredTransport,
   Recovery,
   RecoveryModule,
@@ -186,9 +191,15 @@ type _WebGpuOpen = Extends<
 type _WebGl2Open = Extends<[HTMLCanvasElement], Parameters<typeof WebGl2.GraphicsDevice.webgl2>>;
 
 type _Input = Extends<Recoveries.MeasurementInput, MeasurementInput>;
-type _ReadFolder = Extends<
-  Parameters<RecoveryModule['MeasurementInput']['readFolder']>,
-  Parameters<typeof Recoveries.MeasurementInput.readFolder>
+type _CaptureReader = Extends<CaptureReaders.CaptureReader, CaptureReader>;
+type _OpenCapture = Extends<
+  Parameters<CaptureReaderModule['CaptureReader']['open']>,
+  Parameters<typeof CaptureReaders.CaptureReader.open>
+>;
+type _CaptureBuilder = Extends<Recoveries.CaptureBuilder, CaptureBuilder>;
+type _CaptureBuilderOf = Extends<
+  ConstructorParameters<RecoveryModule['CaptureBuilder']>,
+  ConstructorParameters<typeof Recoveries.CaptureBuilder>
 >;
 type _Builder = Extends<Recoveries.MeasurementBuilder, MeasurementBuilder>;
 type _BuilderOf = Extends<
@@ -209,12 +220,15 @@ type _Prepare = Extends<
 type _TileRecovery = Extends<Recoveries.TileRecovery, TileRecovery>;
 type _TileRecoveryOf = Extends<[Uint8Array], ConstructorParameters<typeof Recoveries.TileRecovery>>;
 type _Recovered = Extends<Recoveries.RecoveredTransport, RecoveredTransport>;
-type _LinearPng = Extends<Recoveries.LinearPng, LinearPng>;
+type _LinearPng = Extends<CaptureReaders.LinearPng, LinearPng>;
 type _ReadPhotograph = Extends<
-  [PageFiles, string, number, number],
-  Parameters<typeof Recoveries.readPhotograph>
+  Parameters<CaptureReaderModule['readPhotograph']>,
+  Parameters<typeof CaptureReaders.readPhotograph>
 >;
-type _ReadPattern = Extends<[PageFiles, string, number], Parameters<typeof Recoveries.readPattern>>;
+type _ReadPattern = Extends<
+  Parameters<CaptureReaderModule['readPattern']>,
+  Parameters<typeof CaptureReaders.readPattern>
+>;
 type _Emission = Extends<ReturnType<typeof Recoveries.emissionOfCodes>, Float32Array>;
 
 export type Contract = [
@@ -272,7 +286,10 @@ export type Contract = [
   _WebGpuOpen,
   _WebGl2Open,
   _Input,
-  _ReadFolder,
+  _CaptureReader,
+  _OpenCapture,
+  _CaptureBuilder,
+  _CaptureBuilderOf,
   _Builder,
   _BuilderOf,
   _Recovery,

@@ -36,7 +36,7 @@ const SCRIPTS = [
   ...['index', 'element', 'core', 'recover'],
 ];
 const CORE_MODULES = ['decoder', 'cpu'];
-const MODULES = [...CORE_MODULES, 'webgl2', 'webgpu', 'recovery'];
+const MODULES = [...CORE_MODULES, 'webgl2', 'webgpu', 'recovery', 'capture_reader'];
 const BUILDS = [...MODULES, 'decoder_scalar', 'cpu_scalar'];
 
 const EXPECTED = [

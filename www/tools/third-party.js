@@ -22,14 +22,14 @@ function cargo(...args) {
 /** The crates whose code is in the modules, without build tools and procedural macros. */
 function compiledIn() {
   const edges = ['-e', 'normal,no-proc-macro', '--prefix', 'none'];
-  const tree = cargo('tree', '--features', 'recovery', '--target', TARGET, ...edges);
+  const tree = cargo('tree', '--features', 'recovery,capture_reader', '--target', TARGET, ...edges);
   const names = new Set(tree.split('\n').map((line) => line.split(' ').slice(0, 2).join(' ')));
   /** @type {{ packages: Crate[] }} */
   const { packages } = JSON.parse(
     cargo(
       'metadata',
       '--features',
-      'recovery',
+      'recovery,capture_reader',
       '--format-version',
       '1',
       '--filter-platform',

@@ -17,7 +17,7 @@ use crate::cli::measurement_reader::{MeasurementReader, read_patterns};
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
-use crate::export::{self, MemoryPlan, PreparedExport};
+use crate::export::{self, MemoryPlan, PreparedExport, Provenance};
 use crate::format::{EncodedFile, FormatError, Metadata};
 use crate::job_executor::{Cancelled, Executor};
 use crate::recover::{MIN_PATTERNS, PreparedRecovery, RecoverError, TailEstimate};
@@ -76,7 +76,8 @@ impl RecoverJob<'_> {
         let noise = measurements.noise;
         let overexposed =
             self.recover_tiles(measurements, dark, recovery, checkpoint, saturated > 0)?;
-        let metadata = export::metadata(self.folder.manifest(), self.shots, method);
+        let provenance = Provenance::new(self.folder.manifest(), self.shots);
+        let metadata = export::metadata(&provenance, method);
         let patterns = metadata.capture.patterns;
         let encode = || self.encode(recovery, checkpoint, metadata);
         let file = thread_pool(encoders)?.install(encode)?;

@@ -3,7 +3,7 @@
 use js_sys::Float32Array;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::capture_files::PageFiles;
+use super::page_files::PageFiles;
 use crate::capture::{
     ManifestCamera, ManifestLight, Pattern, read_unlisted_pattern, read_unlisted_photo,
 };
@@ -70,27 +70,11 @@ pub fn read_photograph(
 /// `capture-file` or `capture-pattern`; the message names the file.
 #[wasm_bindgen(js_name = readPattern)]
 pub fn read_pattern(files: PageFiles, name: &str, gamma: f64) -> Result<LinearPng, CodedError> {
-    let (extent, pattern) = read_unlisted_pattern(&files, name, &emission(gamma))?;
+    let emission = ManifestLight::of_gamma(gamma).emission();
+    let (extent, pattern) = read_unlisted_pattern(&files, name, &emission)?;
     let data = match &pattern {
         Pattern::Grey(values) => values.clone(),
         Pattern::Rgb(_) => pattern.rgb(),
     };
     Ok(LinearPng { extent, data })
-}
-
-/// The emission of the codes 0 to 255.
-#[wasm_bindgen(js_name = emissionOfCodes)]
-pub fn emission_of_codes(gamma: f64) -> Vec<f32> {
-    emission(gamma)
-        .into_iter()
-        .map(|value| value as f32)
-        .collect()
-}
-
-fn emission(gamma: f64) -> [f64; 256] {
-    let light = ManifestLight {
-        gamma: Some(gamma),
-        ..ManifestLight::default()
-    };
-    light.emission()
 }

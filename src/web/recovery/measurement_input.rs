@@ -1,82 +1,26 @@
-//! Measurements from a capture folder, or from pictures that the page has in memory.
+//! The measurements that a page recovers from.
 
 use std::sync::Arc;
 
-use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::capture_files::PageFiles;
-use super::error::{corrupt, out_of_memory};
-use crate::calibrate::{GrayCodePhotos, LightPlaneAxis};
-use crate::capture::{
-    CameraRowSet, CaptureFolder, LinearPhoto, Manifest, Measurements, NoiseModel, Pattern, Shot,
-};
-use crate::export::select_shots;
-use crate::transport::{CHANNELS, Correspondence, Extent};
+use super::error::corrupt;
+use crate::capture::Measurements;
+use crate::export::Provenance;
 use crate::web::CodedError;
-use crate::web::progress::{ReportingExecutor, report_job};
+use crate::web::recovery_error::out_of_memory;
 
 /// The measurements of a recovery, and what its file says of their origin.
 #[wasm_bindgen]
 #[derive(Clone)]
 pub struct MeasurementInput {
     pub(super) measurements: Arc<Measurements>,
-    /// Title, creator, rights, and the patterns by name.
-    pub(super) manifest: Arc<Manifest>,
-    /// Indices of the manifest's shots that the measurements are of.
-    pub(super) shots: Vec<usize>,
+    pub(super) provenance: Arc<Provenance>,
     pub(super) saturated_samples: usize,
 }
 
 #[wasm_bindgen]
 impl MeasurementInput {
-    /// Reads a capture folder: of its shots the first `count`, or all but those held out. `onShot` gets the number of
-    /// shots read.
-    ///
-    /// # Errors
-    /// Codes that begin with `capture-`; `recover-correspondence` if the Gray code is unclear; `recover-patterns` if
-    /// there are fewer shots.
-    #[wasm_bindgen(js_name = readFolder)]
-    pub fn read_folder(
-        files: PageFiles,
-        count: Option<usize>,
-        #[wasm_bindgen(js_name = onShot)] on_shot: &Function,
-    ) -> Result<Self, CodedError> {
-        let folder = CaptureFolder::from_files(files)?;
-        let manifest = folder.manifest();
-        let shots = select_shots(&manifest.shots, count)?;
-        let dark = folder.read_dark()?;
-        folder.open_flood(&dark)?;
-        let rows = CameraRowSet::all(manifest.camera.height);
-        let correspondence = match manifest.correspondence {
-            Some(correspondence) => correspondence,
-            None => folder
-                .read_gray_code(&dark, &rows)?
-                .correspondence(manifest.camera.extent())?,
-        };
-        let patterns = shots.iter().map(|&i| folder.read_pattern(i));
-        let patterns = patterns.collect::<Result<_, _>>()?;
-        let mut measurements = folder.empty_measurements(&shots, patterns, correspondence, &dark);
-        let mut saturated_samples = 0;
-        ReportingExecutor::run(on_shot, |_| {
-            for (&i, photo) in shots.iter().zip(&mut measurements.photos) {
-                let (samples, saturated) = folder.open_shot(i, &dark)?.read_all()?;
-                *photo = samples;
-                saturated_samples += saturated;
-                report_job();
-            }
-            Ok::<_, CodedError>(())
-        })?;
-        measurements.rows = rows;
-        measurements.noise = NoiseModel::with_gain_from(&measurements);
-        Ok(Self {
-            measurements: Arc::new(measurements),
-            manifest: Arc::new(manifest.clone()),
-            shots,
-            saturated_samples,
-        })
-    }
-
     /// Bytes for [`unpack`](Self::unpack) in another worker of a group.
     ///
     /// # Errors
@@ -92,9 +36,8 @@ impl MeasurementInput {
     pub fn unpack(packed: &[u8]) -> Result<Self, CodedError> {
         let measurements: Measurements = postcard::from_bytes(packed).map_err(|_| corrupt())?;
         Ok(Self {
-            shots: (0..measurements.photos.len()).collect(),
             measurements: Arc::new(measurements),
-            manifest: Arc::default(),
+            provenance: Arc::default(),
             saturated_samples: 0,
         })
     }
@@ -114,13 +57,7 @@ impl MeasurementInput {
     /// Indices of the shots that are recovered from.
     #[wasm_bindgen(getter, js_name = shotsUsed)]
     pub fn shots_used(&self) -> Vec<usize> {
-        self.shots.clone()
-    }
-
-    /// Fields of the manifest that are ignored because they are unknown.
-    #[wasm_bindgen(getter, js_name = unknownFields)]
-    pub fn unknown_fields(&self) -> Vec<String> {
-        self.manifest.unknown.clone()
+        self.provenance.shots.clone()
     }
 
     /// The map from camera pixels to light elements: `a, b, c, d, e, f` with `u = a(x+½) + b(y+½) + c` and
@@ -129,231 +66,4 @@ impl MeasurementInput {
     pub fn correspondence(&self) -> Vec<f64> {
         self.measurements.correspondence.affine.concat()
     }
-}
-
-/// Takes patterns and photographs one by one. Photographs have linear RGB, `[N, 3]`, 1 where a sample saturates at
-/// exposure 1, and NaN where it is saturated.
-#[wasm_bindgen]
-pub struct MeasurementBuilder {
-    camera: Extent,
-    light: Extent,
-    /// Distance of two codes of a photograph.
-    quantum: f64,
-    dark: Option<LinearPhoto>,
-    correspondence: Option<Correspondence>,
-    patterns: Vec<Pattern>,
-    full_scale: Vec<f32>,
-    photos: Vec<LinearPhoto>,
-    gray_code: Vec<(GrayCodeBit, LinearPhoto)>,
-    saturated_samples: usize,
-}
-
-/// Axis, bit and whether the pattern was inverted.
-type GrayCodeBit = (LightPlaneAxis, u32, bool);
-
-#[wasm_bindgen]
-impl MeasurementBuilder {
-    /// For photographs of `width` × `height` pixels and patterns of `lightWidth` × `lightHeight` elements. Codes of the
-    /// photographs are `quantum` apart.
-    #[wasm_bindgen(constructor)]
-    pub fn new(
-        width: u32,
-        height: u32,
-        #[wasm_bindgen(js_name = lightWidth)] light_width: u32,
-        #[wasm_bindgen(js_name = lightHeight)] light_height: u32,
-        quantum: f64,
-    ) -> Self {
-        Self {
-            camera: Extent::new(width, height),
-            light: Extent::new(light_width, light_height),
-            quantum,
-            dark: None,
-            correspondence: None,
-            patterns: Vec::new(),
-            full_scale: Vec::new(),
-            photos: Vec::new(),
-            gray_code: Vec::new(),
-            saturated_samples: 0,
-        }
-    }
-
-    /// Sets the photograph under no light, which is subtracted from those added later.
-    ///
-    /// # Errors
-    /// `capture-size` if it has another number of samples.
-    #[wasm_bindgen(js_name = setDark)]
-    pub fn set_dark(&mut self, photo: &[f32]) -> Result<(), CodedError> {
-        self.dark = Some(self.photo("the dark photograph", photo, 1.0)?);
-        Ok(())
-    }
-
-    /// Adds a pattern, `[M]` or `[M, 3]` with emission 0 to 1, and its photograph at a relative exposure.
-    ///
-    /// # Errors
-    /// `capture-size` if either has another number of values.
-    #[wasm_bindgen(js_name = addShot)]
-    pub fn add_shot(
-        &mut self,
-        pattern: &[f32],
-        photo: &[f32],
-        exposure: f64,
-    ) -> Result<(), CodedError> {
-        let (i, area) = (self.photos.len(), self.light.area());
-        let pattern = match pattern.len() {
-            n if n == area => Pattern::Grey(pattern.to_vec()),
-            n if n == CHANNELS * area => {
-                let plane = |c| pattern.iter().skip(c).step_by(CHANNELS).copied().collect();
-                Pattern::Rgb(std::array::from_fn(plane))
-            }
-            n => {
-                let light = self.light;
-                return Err(wrong_size(
-                    &format!("pattern {i}"),
-                    n,
-                    "light elements",
-                    light,
-                ));
-            }
-        };
-        let photo = self.photo(&format!("photograph {i}"), photo, exposure)?;
-        let samples = photo.as_flattened().iter();
-        self.saturated_samples += samples.filter(|sample| sample.is_nan()).count();
-        self.patterns.push(pattern);
-        self.full_scale.push((1.0 / exposure) as f32);
-        self.photos.push(photo);
-        Ok(())
-    }
-
-    /// Sets the map from camera pixels to light elements, as
-    /// [`correspondence`](MeasurementInput::correspondence).
-    ///
-    /// # Errors
-    /// `recover-correspondence` if it is not an invertible map.
-    #[wasm_bindgen(js_name = setCorrespondence)]
-    pub fn set_correspondence(&mut self, affine: &[f64]) -> Result<(), CodedError> {
-        let invalid = || {
-            let message = "the correspondence is not an invertible map of six finite numbers";
-            CodedError::new("recover-correspondence", message)
-        };
-        let &[a, b, c, d, e, f] = affine else {
-            return Err(invalid());
-        };
-        if !affine.iter().all(|x| x.is_finite()) || a * e - b * d == 0.0 {
-            return Err(invalid());
-        }
-        self.correspondence = Some(Correspondence {
-            affine: [[a, b, c], [d, e, f]],
-        });
-        Ok(())
-    }
-
-    /// Adds a photograph of one bit, 0 the least significant, of the Gray code of columns or of rows.
-    ///
-    /// # Errors
-    /// `capture-size` if it has another number of samples.
-    #[wasm_bindgen(js_name = addGrayCode)]
-    pub fn add_gray_code(
-        &mut self,
-        #[wasm_bindgen(js_name = isOfRows)] is_of_rows: bool,
-        bit: u32,
-        inverted: bool,
-        photo: &[f32],
-    ) -> Result<(), CodedError> {
-        let axis = match is_of_rows {
-            true => LightPlaneAxis::Y,
-            false => LightPlaneAxis::X,
-        };
-        let name = format!("the Gray code photograph of axis {axis}, bit {bit}");
-        let photo = self.photo(&name, photo, 1.0)?;
-        self.gray_code.push(((axis, bit, inverted), photo));
-        Ok(())
-    }
-
-    /// The measurements. Title, creator and rights are copied into the file.
-    ///
-    /// # Errors
-    /// `recover-correspondence` if there is neither a correspondence nor clear Gray code.
-    pub fn finish(
-        self,
-        title: String,
-        creator: String,
-        rights: String,
-    ) -> Result<MeasurementInput, CodedError> {
-        let correspondence = match self.correspondence {
-            Some(correspondence) => correspondence,
-            None => self.decode_gray_code()?,
-        };
-        let black = vec![[0.0; CHANNELS]; self.camera.area()];
-        let dark = self.dark.as_ref().unwrap_or(&black);
-        let mut measurements = Measurements {
-            camera: self.camera,
-            light: self.light,
-            correspondence,
-            patterns: self.patterns,
-            full_scale: self.full_scale,
-            rows: CameraRowSet::all(self.camera.height),
-            photos: self.photos,
-            noise: NoiseModel::from_dark(dark, self.camera.width, self.quantum),
-        };
-        measurements.noise = NoiseModel::with_gain_from(&measurements);
-        let shots: Vec<usize> = (0..measurements.photos.len()).collect();
-        // Shots of one pattern at several exposures have one name.
-        let patterns = &measurements.patterns;
-        let shot = |i: &usize| {
-            let first = patterns.iter().position(|pattern| *pattern == patterns[*i]);
-            Shot {
-                pattern: first.unwrap_or(*i).to_string(),
-                ..Shot::default()
-            }
-        };
-        let listed = shots.iter().map(shot).collect();
-        Ok(MeasurementInput {
-            measurements: Arc::new(measurements),
-            manifest: Arc::new(Manifest {
-                title,
-                creator,
-                rights,
-                shots: listed,
-                ..Manifest::default()
-            }),
-            shots,
-            saturated_samples: self.saturated_samples,
-        })
-    }
-
-    fn decode_gray_code(&self) -> Result<Correspondence, CodedError> {
-        let rows = (0..self.camera.height).collect();
-        let photos = GrayCodePhotos::collect(self.light, rows, |axis, bit, inverted| {
-            let mut photos = self.gray_code.iter();
-            let found = photos.find(|(found, _)| *found == (axis, bit, inverted));
-            found.map(|(_, photo)| photo.clone()).ok_or_else(|| {
-                let message = format!(
-                    "the Gray code lacks axis {axis}, bit {bit}, inverted {inverted}; give all bits, \
-                     or the correspondence"
-                );
-                CodedError::new("recover-correspondence", message)
-            })
-        })?;
-        Ok(photos.correspondence(self.camera)?)
-    }
-
-    /// A photograph in units of the measurement, less the dark one.
-    fn photo(&self, name: &str, samples: &[f32], exposure: f64) -> Result<LinearPhoto, CodedError> {
-        let (pixels, rest) = samples.as_chunks::<CHANNELS>();
-        if !rest.is_empty() || pixels.len() != self.camera.area() {
-            let (n, camera) = (samples.len(), self.camera);
-            return Err(wrong_size(name, n, "pixels of three samples", camera));
-        }
-        let dark = |n: usize| self.dark.as_ref().map_or([0.0; CHANNELS], |dark| dark[n]);
-        let linear = |(n, pixel): (usize, &[f32; CHANNELS])| {
-            let dark = dark(n);
-            std::array::from_fn(|c| (f64::from(pixel[c]) / exposure) as f32 - dark[c])
-        };
-        Ok(pixels.iter().enumerate().map(linear).collect())
-    }
-}
-
-fn wrong_size(name: &str, found: usize, unit: &str, expected: Extent) -> CodedError {
-    let message = format!("{name} has {found} values, not those of {expected} {unit}");
-    CodedError::new("capture-size", message)
 }

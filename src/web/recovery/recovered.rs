@@ -3,9 +3,7 @@
 use js_sys::Float32Array;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::capture_files::PageFiles;
 use super::recovery_job::Recovery;
-use crate::capture::CaptureFolder;
 use crate::export;
 use crate::relight::{Light, reference};
 use crate::transport::{
@@ -89,27 +87,6 @@ impl RecoveredTransport {
             }
         }
         Ok(vec![sum.signal, sum.error])
-    }
-
-    /// As [`picture_error`](Self::picture_error), summed over the shots of a capture folder that are not in `used`.
-    ///
-    /// # Errors
-    /// Codes that begin with `capture-`.
-    #[wasm_bindgen(js_name = heldOutError)]
-    pub fn held_out_error(&self, files: PageFiles, used: &[usize]) -> Result<Vec<f64>, CodedError> {
-        let folder = CaptureFolder::from_files(files)?;
-        let manifest = folder.manifest();
-        let dark = folder.read_dark()?;
-        let mut sums = vec![0.0; 2];
-        for i in (0..manifest.shots.len()).filter(|i| !used.contains(i)) {
-            let light = folder.read_pattern(i)?.rgb();
-            let (photo, _) = folder.open_shot(i, &dark)?.read_all()?;
-            let error = self.picture_error(&light, photo.as_flattened())?;
-            for (sum, error) in sums.iter_mut().zip(error) {
-                *sum += error;
-            }
-        }
-        Ok(sums)
     }
 
     /// Columns of the light plane.

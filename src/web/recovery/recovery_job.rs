@@ -5,12 +5,11 @@ use std::io::{self, ErrorKind};
 use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::error::out_of_memory;
 use super::group_executor::{GroupExecutor, ProcessGroup};
 use super::measurement_input::MeasurementInput;
 use crate::capture::Measurements;
 use crate::export::{
-    self, FileQuality, MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation,
+    self, FileQuality, MIN_PLAUSIBLE_SNR, PreparedExport, Provenance, has_implausible_saturation,
 };
 use crate::recover::{
     MIN_PATTERNS, Method, PreparedRecovery, RecoverError, SparsityBasis, TailEstimate,
@@ -18,6 +17,7 @@ use crate::recover::{
 use crate::transport::{Basis, Decibels, Window};
 use crate::web::CodedError;
 use crate::web::progress::{ReportingExecutor, report_jobs_of};
+use crate::web::recovery_error::out_of_memory;
 
 /// A recovery that is prepared. Tiles can be recovered in any order, here or in other workers.
 #[wasm_bindgen]
@@ -259,7 +259,7 @@ impl Recovery {
     }
 
     pub(super) fn metadata(&self) -> crate::format::Metadata {
-        export::metadata(&self.input.manifest, &self.input.shots, self.method)
+        export::metadata(&self.input.provenance, self.method)
     }
 }
 
@@ -307,10 +307,13 @@ fn name_shots(input: &MeasurementInput, error: RecoverError) -> CodedError {
         return error.into();
     };
     let names = pattern_indices.iter().map(|&l| {
-        let i = input.shots[l];
-        match input.manifest.shots.get(i).map(|shot| &*shot.photo) {
-            None | Some("") => format!("photograph {i}"),
-            Some(photo) => format!("shots[{i}] ({photo})"),
+        let Provenance {
+            shots, photographs, ..
+        } = &*input.provenance;
+        let shot = shots.get(l).unwrap_or(&l);
+        match photographs.get(l).map(|name| &**name) {
+            None | Some("") => format!("photograph {shot}"),
+            Some(name) => format!("shots[{shot}] ({name})"),
         }
     });
     let names = names.collect::<Vec<_>>().join(", ");

@@ -3,15 +3,7 @@
  * of wasm-bindgen. All pictures are linear, row by row.
  */
 
-import type { DecodedPhoto, Freeable } from './wasm-exports.js';
-
-/** Files that a worker reads within a call. Names are relative to the capture folder. */
-export interface PageFiles {
-  /** Bytes of the file; `undefined` if there is no such file. */
-  size(name: string): number | undefined;
-  /** Throws if the browser cannot read the file. */
-  read(name: string, offset: number, length: number): Uint8Array;
-}
+import type { DecodedPhoto, Freeable, ModuleExports } from './wasm-exports.js';
 
 /** This worker's place in a group of workers that run one algorithm together, and its connections to the others. */
 export interface ProcessGroup {
@@ -31,11 +23,19 @@ export interface MeasurementInput extends Freeable {
   readonly width: number;
   readonly height: number;
   readonly shotsUsed: Uint32Array;
-  readonly unknownFields: string[];
   /** Six numbers, row by row. */
   readonly correspondence: Float64Array;
   /** For `unpack` in another worker of a group. */
   pack(): Uint8Array;
+}
+
+/** Takes the photographs of a capture folder one by one. */
+export interface CaptureBuilder extends Freeable {
+  /** The shots whose photographs to add, in this order. */
+  readonly shots: Uint32Array;
+  addPhotograph(photograph: Float32Array): void;
+  /** Ends the builder, also if it throws. */
+  finish(): MeasurementInput;
 }
 
 /** Takes patterns and photographs one by one. */
@@ -94,8 +94,6 @@ export interface RecoveredTransport extends Freeable {
   relight(light: Float32Array): Float32Array;
   /** Energy of the true picture, and of the difference of the picture under its light. */
   pictureError(light: Float32Array, truth: Float32Array): Float64Array;
-  /** The same, summed over the shots of a folder that are not in `used`. */
-  heldOutError(files: PageFiles, used: Uint32Array): Float64Array;
   transportFunction(x: number, y: number): Float32Array;
   windowOrigin(x: number, y: number): Int32Array;
   pointScatteringFunction(u: number, v: number): Float32Array;
@@ -103,21 +101,13 @@ export interface RecoveredTransport extends Freeable {
   tileFunctions(index: number): Float32Array;
 }
 
-/** A PNG that is decoded. */
-export interface LinearPng extends Freeable {
-  readonly width: number;
-  readonly height: number;
-  /** Three values for each pixel of a photograph; one or three for each element of a pattern. */
-  readonly data: Float32Array;
-}
-
 export interface RecoveryModule {
-  /** Gives the started module's exports. */
-  default(): Promise<{ readonly memory: Pick<WebAssembly.Memory, 'buffer'> }>;
+  default(): Promise<ModuleExports>;
   MeasurementInput: {
-    readFolder(files: PageFiles, count: number | undefined, onShot: OnJob): MeasurementInput;
     unpack(packed: Uint8Array): MeasurementInput;
   };
+  /** From the calibration that a `CaptureReader` gives. */
+  CaptureBuilder: { new (calibration: Uint8Array): CaptureBuilder };
   MeasurementBuilder: {
     new (
       width: number,
@@ -138,8 +128,6 @@ export interface RecoveryModule {
       group: ProcessGroup | undefined,
     ): Promise<Recovery>;
   };
-  readPhotograph(files: PageFiles, name: string, black: number, white: number): LinearPng;
-  readPattern(files: PageFiles, name: string, gamma: number): LinearPng;
   /** The emission of the codes 0 to 255. */
   emissionOfCodes(gamma: number): Float32Array;
   TileRecovery: { new (packed: Uint8Array): TileRecovery };

@@ -20,6 +20,11 @@ export interface Freeable {
   free(): void;
 }
 
+/** What a started module gives beside its functions and classes. */
+export interface ModuleExports {
+  readonly memory: Pick<WebAssembly.Memory, 'buffer'>;
+}
+
 /** A photograph in a module's memory, with some or all of its tiles. */
 export interface ModulePhoto extends Freeable {
   /** Moves a tile out; it is dark here afterwards. Not allowed while a CPU relighter uses the photograph. */

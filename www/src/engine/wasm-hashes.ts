@@ -3,6 +3,7 @@
  * of these, which check nothing.
  */
 
+export const capture_reader = '';
 export const decoder = '';
 export const decoder_scalar = '';
 export const cpu = '';

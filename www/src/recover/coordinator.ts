@@ -1,5 +1,6 @@
 /** The coordinator of a recovery, in a worker: reads, prepares, keeps the tiles, and answers questions about the result. */
 
+import type { CaptureReader, CaptureReaderModule } from '../engine/capture-reader-exports.js';
 import type {
   MeasurementBuilder,
   MeasurementInput,
@@ -35,7 +36,7 @@ export class Coordinator implements Answers<CoordinatorCalls> {
   #header: PicturesHeader | null = null;
   #reader: PictureReader | null = null;
   #dark: Float32Array | null = null;
-  #files: ReadonlyMap<string, Blob> = new Map();
+  #captureReader: CaptureReader | null = null;
   #builder: MeasurementBuilder | null = null;
   #input: MeasurementInput | null = null;
   #shotsUsed: readonly number[] = [];
@@ -44,30 +45,42 @@ export class Coordinator implements Answers<CoordinatorCalls> {
   #camera: PictureSize = { width: 0, height: 0 };
   #light: PictureSize = { width: 0, height: 0 };
 
-  /** `report` tells the page the steps of the call in progress. */
+  /**
+   * `loadReader` is called when there are files to read. `report` tells the page the steps of the call in progress.
+   */
   constructor(
     private readonly module: RecoveryModule,
+    private readonly loadReader: () => Promise<CaptureReaderModule>,
     private readonly report: (steps: number) => void,
   ) {}
 
-  readFolder(files: ReadonlyMap<string, Blob>, shots: number | undefined): InputSummary {
-    this.#files = files;
-    const { MeasurementInput } = this.module;
-    return this.#setInput(MeasurementInput.readFolder(pageFiles(files), shots, this.report));
+  async readFolder(
+    files: ReadonlyMap<string, Blob>,
+    shots: number | undefined,
+  ): Promise<InputSummary> {
+    const { CaptureReader } = await this.loadReader();
+    const reader = CaptureReader.open(pageFiles(files));
+    this.#captureReader = reader;
+    const builder = new this.module.CaptureBuilder(reader.calibration(shots));
+    for (const [i, shot] of builder.shots.entries()) {
+      builder.addPhotograph(reader.photograph(shot));
+      this.report(i + 1);
+    }
+    return this.#setInput(builder.finish(), reader.unknownFields);
   }
 
   beginPictures(header: PicturesHeader): void {
     const { width, height, lightWidth, lightHeight, quantum } = header;
     const { MeasurementBuilder } = this.module;
     this.#header = header;
-    this.#reader = new PictureReader(this.module, header);
+    this.#reader = new PictureReader(this.module, this.loadReader, header);
     this.#camera = { width, height };
     this.#light = { width: lightWidth, height: lightHeight };
     this.#builder = new MeasurementBuilder(width, height, lightWidth, lightHeight, quantum);
   }
 
-  setDark(photograph: SentPicture): void {
-    this.#dark = this.#readPhotograph(photograph, 'the dark photograph');
+  async setDark(photograph: SentPicture): Promise<void> {
+    this.#dark = await this.#readPhotograph(photograph, 'the dark photograph');
     existing(this.#builder).setDark(this.#dark);
   }
 
@@ -75,15 +88,25 @@ export class Coordinator implements Answers<CoordinatorCalls> {
     existing(this.#builder).setCorrespondence(Float64Array.from(correspondence.flat()));
   }
 
-  addGrayCode(axis: 'x' | 'y', bit: number, inverted: boolean, photograph: SentPicture): void {
+  async addGrayCode(
+    axis: 'x' | 'y',
+    bit: number,
+    inverted: boolean,
+    photograph: SentPicture,
+  ): Promise<void> {
     const name = `the Gray code photograph of axis ${axis}, bit ${bit}, inverted ${inverted}`;
-    const samples = this.#readPhotograph(photograph, name);
+    const samples = await this.#readPhotograph(photograph, name);
     existing(this.#builder).addGrayCode(axis === 'y', bit, inverted, samples);
   }
 
-  addShot(index: number, pattern: SentPicture, photograph: SentPicture, exposure: number): void {
-    const emission = existing(this.#reader).pattern(pattern, `pattern ${index}`, this.#light);
-    const samples = this.#readPhotograph(photograph, `photograph ${index}`);
+  async addShot(
+    index: number,
+    pattern: SentPicture,
+    photograph: SentPicture,
+    exposure: number,
+  ): Promise<void> {
+    const emission = await existing(this.#reader).pattern(pattern, `pattern ${index}`, this.#light);
+    const samples = await this.#readPhotograph(photograph, `photograph ${index}`);
     existing(this.#builder).addShot(emission, samples, exposure);
   }
 
@@ -91,7 +114,7 @@ export class Coordinator implements Answers<CoordinatorCalls> {
     const builder = existing(this.#builder);
     const { title, creator, rights } = existing(this.#header);
     this.#builder = null;
-    return this.#setInput(builder.finish(title, creator, rights));
+    return this.#setInput(builder.finish(title, creator, rights), []);
   }
 
   packInput(): Uint8Array {
@@ -178,32 +201,40 @@ export class Coordinator implements Answers<CoordinatorCalls> {
     return { x, y, width, height, values: transport.tileFunctions(index) };
   }
 
-  evaluatePair(
+  async evaluatePair(
     index: number,
     light: SentPicture,
     photograph: SentPicture,
     exposure: number,
-  ): PictureError {
-    const rgb = existing(this.#reader).light(light, `the light of pair ${index}`, this.#light);
-    const samples = this.#readPhotograph(photograph, `the photograph of pair ${index}`);
+  ): Promise<PictureError> {
+    const reader = existing(this.#reader);
+    const rgb = await reader.light(light, `the light of pair ${index}`, this.#light);
+    const samples = await this.#readPhotograph(photograph, `the photograph of pair ${index}`);
     const dark = this.#dark;
     const truth = samples.map((sample, i) => sample / exposure - (dark?.[i] ?? 0));
     return energies(existing(this.#transport).pictureError(rgb, truth));
   }
 
   evaluateHeldOut(): PictureError {
-    const files = pageFiles(this.#files);
-    const used = Uint32Array.from(this.#shotsUsed);
-    return energies(existing(this.#transport).heldOutError(files, used));
+    const [reader, transport] = [existing(this.#captureReader), existing(this.#transport)];
+    const sum = { signal: 0, error: 0 };
+    for (let shot = 0; shot < reader.shots; shot += 1) {
+      if (this.#shotsUsed.includes(shot)) continue;
+      const picture = transport.pictureError(reader.light(shot), reader.photograph(shot));
+      const { signal, error } = energies(picture);
+      sum.signal += signal;
+      sum.error += error;
+    }
+    return sum;
   }
 
-  #setInput(input: MeasurementInput): InputSummary {
-    const { width, height, unknownFields } = input;
+  #setInput(input: MeasurementInput, unknownFields: readonly string[]): InputSummary {
+    const { width, height } = input;
     const [a, b, c, d, e, f] = input.correspondence as unknown as number[] & { length: 6 };
     this.#input = input;
     this.#camera = { width, height };
     this.#shotsUsed = [...input.shotsUsed];
-    this.#reader ??= new PictureReader(this.module, DEFAULT_CODES);
+    this.#reader ??= new PictureReader(this.module, this.loadReader, DEFAULT_CODES);
     const correspondence = [
       [a, b, c],
       [d, e, f],
@@ -211,7 +242,7 @@ export class Coordinator implements Answers<CoordinatorCalls> {
     return { width, height, correspondence, shotsUsed: this.#shotsUsed, unknownFields };
   }
 
-  #readPhotograph(photograph: SentPicture, name: string): Float32Array {
+  #readPhotograph(photograph: SentPicture, name: string): Promise<Float32Array> {
     return existing(this.#reader).photograph(photograph, name, this.#camera);
   }
 }

@@ -1,6 +1,6 @@
 /** Files that a worker reads within a call. */
 
-import type { PageFiles } from '../engine/recovery-exports.js';
+import type { PageFiles } from '../engine/capture-reader-exports.js';
 
 /** The compiler knows only the global scope of pages. */
 declare const FileReaderSync: new () => { readAsArrayBuffer(blob: Blob): ArrayBuffer };

@@ -1,6 +1,7 @@
 /** Makes the pictures of a page linear, in the worker. */
 
-import type { LinearPng, RecoveryModule } from '../engine/recovery-exports.js';
+import type { CaptureReaderModule, LinearPng } from '../engine/capture-reader-exports.js';
+import type { RecoveryModule } from '../engine/recovery-exports.js';
 import { PhotoError } from '../shared/errors.js';
 import { pageFiles } from './page-files.js';
 import type { PictureSize, PicturesHeader, SentPicture } from './protocol.js';
@@ -22,47 +23,53 @@ type ReaderSettings = Pick<PicturesHeader, 'lightGamma' | 'black' | 'white'>;
 export class PictureReader {
   readonly #emission: Float32Array;
 
+  /** `loadReader` is called for PNGs only. */
   constructor(
-    private readonly module: RecoveryModule,
+    { emissionOfCodes }: Pick<RecoveryModule, 'emissionOfCodes'>,
+    private readonly loadReader: () => Promise<CaptureReaderModule>,
     private readonly settings: ReaderSettings,
   ) {
-    this.#emission = module.emissionOfCodes(settings.lightGamma);
+    this.#emission = emissionOfCodes(settings.lightGamma);
   }
 
   /** Three values for each pixel. `name` is the picture's name in messages. */
-  photograph(picture: SentPicture, name: string, size: PictureSize): Float32Array {
+  async photograph(picture: SentPicture, name: string, size: PictureSize): Promise<Float32Array> {
     const { black, white } = this.settings;
-    const decode = (file: Blob) =>
-      this.module.readPhotograph(pageFiles(new Map([[name, file]])), name, black, white);
-    const linear = toLinear(picture, SRGB, decode);
+    const decode = async (file: Blob) => {
+      const reader = await this.loadReader();
+      return reader.readPhotograph(pageFiles(new Map([[name, file]])), name, black, white);
+    };
+    const linear = await toLinear(picture, SRGB, decode);
     return checkSize(linear, name, size, [3]);
   }
 
   /** One or three values for each light element: one if the channels of its codes are equal. */
-  pattern(picture: SentPicture, name: string, size: PictureSize): Float32Array {
+  async pattern(picture: SentPicture, name: string, size: PictureSize): Promise<Float32Array> {
     const { lightGamma } = this.settings;
-    const decode = (file: Blob) =>
-      this.module.readPattern(pageFiles(new Map([[name, file]])), name, lightGamma);
-    const linear = toLinear(picture, this.#emission, decode);
+    const decode = async (file: Blob) => {
+      const reader = await this.loadReader();
+      return reader.readPattern(pageFiles(new Map([[name, file]])), name, lightGamma);
+    };
+    const linear = await toLinear(picture, this.#emission, decode);
     const data = checkSize(linear, name, size, [1, 3]);
     return isGrey(data, size) ? data.filter((_, i) => i % 3 === 0) : data;
   }
 
   /** As `pattern`, with three values for each light element. */
-  light(picture: SentPicture, name: string, size: PictureSize): Float32Array {
-    const data = this.pattern(picture, name, size);
+  async light(picture: SentPicture, name: string, size: PictureSize): Promise<Float32Array> {
+    const data = await this.pattern(picture, name, size);
     if (data.length !== size.width * size.height) return data;
     return Float32Array.from({ length: 3 * data.length }, (_, i) => data[Math.floor(i / 3)] ?? 0);
   }
 }
 
-function toLinear(
+async function toLinear(
   picture: SentPicture,
   table: Float32Array,
-  decode: (file: Blob) => LinearPng,
-): LinearValues {
+  decode: (file: Blob) => Promise<LinearPng>,
+): Promise<LinearValues> {
   if (picture instanceof Blob) {
-    const png = decode(picture);
+    const png = await decode(picture);
     const { width, height, data } = png;
     png.free();
     return { width, height, data };

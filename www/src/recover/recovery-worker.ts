@@ -1,6 +1,8 @@
 /** The script of the workers of a recovery: one is the coordinator, the others recover tiles. */
 
+import { loadCaptureReader } from '../engine/capture-reader-module.js';
 import { loadRecovery } from '../engine/recovery-module.js';
+import type { ModuleExports } from '../engine/wasm-exports.js';
 import { serve } from '../engine/worker-server.js';
 import { messageOf, toPhotoError } from '../shared/errors.js';
 import { Deferred } from '../shared/promises.js';
@@ -14,7 +16,7 @@ const REPORT_INTERVAL_MS = 50;
 const MIN_EXHAUSTED_BYTES = 256 << 20;
 
 type Methods = Record<string, (...args: readonly unknown[]) => unknown>;
-type Memory = Pick<WebAssembly.Memory, 'buffer'>;
+type Memory = ModuleExports['memory'];
 
 /** Reports the steps of the task in progress, not too often. */
 class TaskProgress {
@@ -40,13 +42,14 @@ function stopOfModule(): { readonly stopped: Promise<never>; readonly release: (
   return { stopped: promise, release: () => globalThis.removeEventListener('error', onError) };
 }
 
-function explainStop(thrown: unknown, { buffer }: Memory): SentError {
+function explainStop(thrown: unknown, memories: readonly Memory[]): SentError {
   const reason = messageOf(thrown);
-  if (buffer.byteLength < MIN_EXHAUSTED_BYTES) {
+  const bytes = memories.reduce((sum, { buffer }) => sum + buffer.byteLength, 0);
+  if (bytes < MIN_EXHAUSTED_BYTES) {
     return { code: 'internal', message: `The recovery stopped: ${reason}.` };
   }
   const message =
-    `The recovery stopped with ${Math.round(buffer.byteLength / 2 ** 20)} MiB of memory, probably because the browser ` +
+    `The recovery stopped with ${Math.round(bytes / 2 ** 20)} MiB of memory, probably because the browser ` +
     `has no more (${reason}). Close other tabs, or recover with fewer camera pixels or photographs.`;
   return { code: 'recover-memory', message };
 }
@@ -59,9 +62,15 @@ function buffersOf(value: unknown): Transferable[] {
 
 async function start() {
   const module = await loadRecovery();
-  const { memory } = await module.default();
+  const memories = [(await module.default()).memory];
+  const loadReader = async () => {
+    const reader = await loadCaptureReader();
+    const { memory } = await reader.default();
+    if (!memories.includes(memory)) memories.push(memory);
+    return reader;
+  };
   const progress = new TaskProgress();
-  const coordinator = new Coordinator(module, progress.report);
+  const coordinator = new Coordinator(module, loadReader, progress.report);
   const tileWorker = new TileWorker(module, progress.report);
   const answer = async ({ method, args }: RecoveryTask): Promise<RecoveryResult> => {
     const target = method in tileWorker ? tileWorker : coordinator;
@@ -71,7 +80,7 @@ async function start() {
       return { value: await Promise.race([value, stopped]) };
     } catch (thrown) {
       if (thrown instanceof WebAssembly.RuntimeError) {
-        return { error: explainStop(thrown, memory), stopped: true };
+        return { error: explainStop(thrown, memories), stopped: true };
       }
       const { code, message } = toPhotoError(thrown);
       return { error: { code, message }, stopped: false };

@@ -20,6 +20,6 @@ export type CrossOrigin = 'anonymous' | 'use-credentials' | null;
 export type ToneCurve = 'clip' | 'filmic';
 
 /** The WebAssembly modules: the decoder, one for each backend, and recovery. */
-export type WasmModuleName = 'decoder' | Backend | 'recovery';
+export type WasmModuleName = 'decoder' | Backend | 'recovery' | 'capture_reader';
 
 export const CORE_MODULES = ['decoder', 'cpu'] as const satisfies readonly WasmModuleName[];
