@@ -46,16 +46,10 @@ impl Provenance {
 
 /// The metadata of a file that is recovered by `method`.
 pub fn metadata(provenance: &Provenance, method: Method) -> Metadata {
-    let Provenance {
-        title,
-        creator,
-        rights,
-        ..
-    } = provenance.clone();
     Metadata {
-        title,
-        creator,
-        rights,
+        title: provenance.title.clone(),
+        creator: provenance.creator.clone(),
+        rights: provenance.rights.clone(),
         capture: CaptureMetadata {
             patterns: provenance.patterns,
             photographs: provenance.shots.len(),

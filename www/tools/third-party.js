@@ -19,22 +19,17 @@ function cargo(...args) {
 
 /** @typedef {{ name: string, version: string, license: string | null, license_file: string | null, manifest_path: string, source: string | null }} Crate */
 
+/** Beside the default ones, those of the package's modules. */
+const FEATURES = 'recovery,capture_reader';
+
 /** The crates whose code is in the modules, without build tools and procedural macros. */
 function compiledIn() {
   const edges = ['-e', 'normal,no-proc-macro', '--prefix', 'none'];
-  const tree = cargo('tree', '--features', 'recovery,capture_reader', '--target', TARGET, ...edges);
+  const tree = cargo('tree', '--features', FEATURES, '--target', TARGET, ...edges);
   const names = new Set(tree.split('\n').map((line) => line.split(' ').slice(0, 2).join(' ')));
   /** @type {{ packages: Crate[] }} */
   const { packages } = JSON.parse(
-    cargo(
-      'metadata',
-      '--features',
-      'recovery,capture_reader',
-      '--format-version',
-      '1',
-      '--filter-platform',
-      TARGET,
-    ),
+    cargo('metadata', '--features', FEATURES, '--format-version', '1', '--filter-platform', TARGET),
   );
   return packages
     .filter(({ name, version, source }) => source !== null && names.has(`${name} v${version}`))

@@ -1,9 +1,10 @@
 //! Recovery for JavaScript: the module `recovery`, which pages load only to recover.
 //!
 //! [`CaptureBuilder`] takes what the module `capture_reader` reads of a folder, [`MeasurementBuilder`] patterns and
-//! photographs that the page has in memory; either gives a [`MeasurementInput`]. A [`Recovery`] prepares, recovers tiles and encodes; other workers recover tiles for it by
-//! [`TileRecovery`], or prepare it together with it ([`group_executor`]). [`RecoveredTransport`] is what a page shows of the
-//! result. Every call runs to its end: a page cancels by ending the worker.
+//! photographs that the page has in memory; either gives a [`MeasurementInput`]. A [`Recovery`] prepares, recovers tiles
+//! and encodes; other workers recover tiles for it by [`TileRecovery`], or prepare it together with it
+//! ([`group_executor`]). [`RecoveredTransport`] is what a page shows of the result. Every call runs to its end: a page
+//! cancels by ending the worker.
 
 mod capture_builder;
 mod error;

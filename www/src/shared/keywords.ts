@@ -19,7 +19,7 @@ export type CrossOrigin = 'anonymous' | 'use-credentials' | null;
 /** How brightness above white is shown: `clip` cuts it off, `filmic` compresses it. */
 export type ToneCurve = 'clip' | 'filmic';
 
-/** The WebAssembly modules: the decoder, one for each backend, and recovery. */
+/** The WebAssembly modules: the decoder, one for each backend, recovery, and its reader of captures. */
 export type WasmModuleName = 'decoder' | Backend | 'recovery' | 'capture_reader';
 
 export const CORE_MODULES = ['decoder', 'cpu'] as const satisfies readonly WasmModuleName[];
