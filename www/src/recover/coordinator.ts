@@ -58,8 +58,7 @@ export class Coordinator implements Answers<CoordinatorCalls> {
     files: ReadonlyMap<string, Blob>,
     shots: number | undefined,
   ): Promise<InputSummary> {
-    const { CaptureReader } = await this.loadReader();
-    const reader = CaptureReader.open(pageFiles(files));
+    const reader = await this.#openFolder(files);
     this.#captureReader = reader;
     const builder = new this.module.CaptureBuilder(reader.calibration(shots));
     for (const [i, shot] of builder.shots.entries()) {
@@ -215,8 +214,10 @@ export class Coordinator implements Answers<CoordinatorCalls> {
     return energies(existing(this.#transport).pictureError(rgb, truth));
   }
 
-  evaluateHeldOut(): PictureError {
-    const [reader, transport] = [existing(this.#captureReader), existing(this.#transport)];
+  async evaluateHeldOut(): Promise<PictureError> {
+    const transport = existing(this.#transport);
+    // Without a folder, the reader says that there is no manifest.
+    const reader = this.#captureReader ?? (await this.#openFolder(new Map()));
     const sum = { signal: 0, error: 0 };
     for (let shot = 0; shot < reader.shots; shot += 1) {
       if (this.#shotsUsed.includes(shot)) continue;
@@ -226,6 +227,11 @@ export class Coordinator implements Answers<CoordinatorCalls> {
       sum.error += error;
     }
     return sum;
+  }
+
+  async #openFolder(files: ReadonlyMap<string, Blob>): Promise<CaptureReader> {
+    const { CaptureReader } = await this.loadReader();
+    return CaptureReader.open(pageFiles(files));
   }
 
   #setInput(input: MeasurementInput, unknownFields: readonly string[]): InputSummary {
