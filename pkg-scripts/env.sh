@@ -70,7 +70,7 @@ if [ -z "${CC_wasm32_unknown_unknown:-}" ] || [ -z "${AR_wasm32_unknown_unknown:
 fi
 export CC_wasm32_unknown_unknown AR_wasm32_unknown_unknown
 
-# The modules compress at levels 1 and 19, whose strategies are fast and btultra2: zstd leaves out the others. A level
+# The modules compress at level 19, whose strategy is btultra2: zstd leaves out the others, as far as it can. A level
 # with another strategy would write other bytes than the command line.
 if [[ ${CFLAGS_wasm32_unknown_unknown:-} != *ZSTD_EXCLUDE_* ]]; then
   for strategy in DFAST GREEDY LAZY LAZY2 BTLAZY2 BTOPT; do

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `u32::MAX` | the [`CheckpointKey`] as JSON; the first record |
 //! | `u32::MAX - 1` | the [fingerprint](super::checkpoint_key) of the prepared recovery; the second record |
-//! | index of a tile | the [tile](crate::export::encode_tile); in the order of completion |
+//! | index of a tile | the [tile](crate::export::encode_tile), compressed by zstd; in the order of completion |
 //!
 //! When the process ends, only the last record can be incomplete; it is then ignored.
 
@@ -31,6 +31,8 @@ const OTHER_VERSION: &str = "was written by another version of this program; use
                              from the beginning";
 /// Maximum length of a key. Tens of thousands of photographs need a few megabytes.
 const MAX_KEY_BYTES: u32 = 64 << 20;
+/// Level of zstd for tiles: the fastest, as each is read a few times and then deleted.
+const ZSTD_LEVEL: i32 = 1;
 /// Bytes before the content of a record: number, length, checksum.
 const RECORD_HEAD_BYTES: usize = 12;
 const KEY: u32 = u32::MAX;
@@ -59,6 +61,14 @@ struct CheckpointRecord {
 /// Locks a checkpoint that threads share.
 pub fn lock(checkpoint: &Mutex<Checkpoint>) -> MutexGuard<'_, Checkpoint> {
     checkpoint.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Compresses the record of a tile for [`Checkpoint::add`].
+///
+/// # Errors
+/// If memory is missing.
+pub fn compress_tile(record: &[u8]) -> io::Result<Vec<u8>> {
+    zstd::bulk::compress(record, ZSTD_LEVEL)
 }
 
 impl Checkpoint {
@@ -150,20 +160,20 @@ impl Checkpoint {
         }
     }
 
-    /// Appends tile `i` with `content`, encoded by [`encode_tile`](crate::export::encode_tile).
+    /// Appends tile `i` with `content`, its record compressed by [`compress_tile`].
     pub fn add(&mut self, i: usize, content: &[u8]) -> Result<()> {
         self.tiles[i] = Some(self.append(i as u32, content)?);
         self.delete_on_drop = false;
         Ok(())
     }
 
-    /// Reads the content of tile `i`'s record.
+    /// Reads tile `i`'s record, decompressed.
     pub fn read(&mut self, i: usize) -> io::Result<Vec<u8>> {
         let range = self.tiles[i].clone().ok_or(ErrorKind::NotFound)?;
         let mut content = vec![0; (range.end - range.start) as usize];
         self.file.seek(SeekFrom::Start(range.start))?;
         self.file.read_exact(&mut content)?;
-        Ok(content)
+        zstd::decode_all(&content[..])
     }
 
     /// Appends a record; returns the range of its content.

@@ -8,7 +8,7 @@ use anyhow::{Context, Error, Result};
 use rayon::prelude::*;
 
 use super::args::RecoverArgs;
-use super::checkpoint::{Checkpoint, lock};
+use super::checkpoint::{Checkpoint, compress_tile, lock};
 use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
 use super::messages;
 use super::report::RecoverReport;
@@ -150,8 +150,8 @@ impl RecoverJob<'_> {
                 if !lock(checkpoint).has(i) {
                     self.cores.check_cancelled()?;
                     let tile = recovery.tile(&measurements, rect);
-                    let record =
-                        export::encode_tile(&tile).context("a tile cannot be compressed")?;
+                    let record = compress_tile(&export::encode_tile(&tile))
+                        .context("a tile cannot be compressed")?;
                     lock(checkpoint).add(i, &record)?;
                     bar.inc(1);
                 }

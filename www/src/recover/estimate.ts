@@ -73,7 +73,7 @@ function memoryBytes(
   const each = 24 * 2 ** 20 + 8 * area * area * 16 + 2 * PIXEL_BYTES * tile * area;
   const patterns = PIXEL_BYTES * photographs * lightWidth * lightHeight;
   const measurements = PIXEL_BYTES * photographs * pixels + patterns;
-  const all = workers * each + measurements + 4 * pixels * area;
+  const all = workers * each + measurements + 8 * pixels * area;
   const strips = 2 * PIXEL_BYTES * photographs * rows + patterns;
   // Measurements are packed before they are sent, and each worker has the packed ones for a while: in its memory, and as
   // JavaScript's array. Those of the coordinator grow by doubling.
