@@ -1,14 +1,15 @@
 //! Groups of equal items, for instance shots of the same pattern.
 
-use std::collections::HashMap;
-use std::hash::Hash;
-
 /// For each item the id of its group: equal items share an id, and ids count from 0 in the order of first occurrence.
-pub(crate) fn group_ids<T: Eq + Hash>(items: impl IntoIterator<Item = T>) -> Vec<usize> {
-    let mut ids = HashMap::new();
+/// Items are compared in pairs: they are few.
+pub(crate) fn group_ids<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<usize> {
+    let mut firsts: Vec<T> = Vec::new();
     let id = |item| {
-        let next = ids.len();
-        *ids.entry(item).or_insert(next)
+        let known = firsts.iter().position(|first| *first == item);
+        known.unwrap_or_else(|| {
+            firsts.push(item);
+            firsts.len() - 1
+        })
     };
     items.into_iter().map(id).collect()
 }

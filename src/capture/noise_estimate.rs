@@ -7,7 +7,7 @@
 
 use super::measurements::Measurements;
 use super::noise_model::{NoiseModel, quantile};
-use crate::linalg::{mirror_upper, symmetric_eigen};
+use crate::linalg::{ascending_order, mirror_upper, symmetric_eigen};
 use crate::transport::{CHANNELS, CameraPixel};
 
 /// Camera pixels along a side of a block. At two pixels a light element, signal then takes a minority of the ranks.
@@ -201,11 +201,11 @@ fn estimate_gain(
             }
         }
     }
-    estimates.map(|mut estimates| {
+    estimates.map(|estimates| {
         // In the brighter half the floor matters least.
-        estimates.sort_by(|a, b| b.0.total_cmp(&a.0));
-        estimates.truncate(estimates.len().div_ceil(2));
-        let mut gains: Vec<f64> = estimates.into_iter().map(|(_, gain)| gain).collect();
+        let brightest = ascending_order(estimates.iter().map(|(measurement, _)| -measurement));
+        let half = brightest.iter().take(estimates.len().div_ceil(2));
+        let mut gains: Vec<f64> = half.map(|&i| estimates[i].1).collect();
         // Signal mistaken for noise increases an estimate, hence a low quantile.
         quantile(&mut gains, 1, 3).unwrap_or(0.0).max(0.0)
     })

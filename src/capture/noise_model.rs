@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::linalg;
 use crate::transport::CHANNELS;
 
 /// Standard deviation of a Gaussian over its median absolute deviation.
@@ -60,6 +61,6 @@ impl NoiseModel {
 
 /// Sorts `values` and returns their quantile `numerator / denominator`; `None` if there are none.
 pub(super) fn quantile(values: &mut [f64], numerator: usize, denominator: usize) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
+    linalg::sort(values);
     values.get(values.len() * numerator / denominator).copied()
 }

@@ -3,7 +3,7 @@
 //!
 //! `A` and `U` are read and written in the upper triangle only; the lower one may hold anything.
 
-use super::vector::{add_scaled, dot};
+use super::kernels::{add_four_scaled, add_scaled, dot};
 
 /// Rows eliminated together: each row below is then loaded and stored a quarter as often.
 const BLOCK: usize = 4;
@@ -43,11 +43,9 @@ pub(crate) fn cholesky(a: &mut [f64], n: usize) -> Option<f64> {
             let row = |k: usize| &done[(first + k) * n..(first + k + 1) * n];
             let (r0, r1, r2, r3) = (row(0), row(1), row(2), row(3));
             for (i, target) in (end..n).zip(rest.chunks_exact_mut(n)) {
-                let (f0, f1, f2, f3) = (r0[i], r1[i], r2[i], r3[i]);
-                let sources = r0[i..].iter().zip(&r1[i..]).zip(&r2[i..]).zip(&r3[i..]);
-                for (t, (((a, b), c), d)) in target[i..].iter_mut().zip(sources) {
-                    *t -= (f0 * a + f1 * b) + (f2 * c + f3 * d);
-                }
+                let factors = [-r0[i], -r1[i], -r2[i], -r3[i]];
+                let sources = [&r0[i..], &r1[i..], &r2[i..], &r3[i..]];
+                add_four_scaled(&mut target[i..], sources, factors);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Products and transposes.
 
-use super::vector::{add_scaled, dot};
+use super::kernels::{add_scaled, dot};
 
 /// Writes `Ax` into `y`, for a square `A` `[n, n]`.
 #[cfg_attr(target_arch = "x86_64", inline(always))]

@@ -1,23 +1,25 @@
 //! Linear algebra on small dense matrices of `f64`, row-major, as slices.
 //!
 //! The matrices here have 3 to about 1000 rows, and one factorisation is over in microseconds: what a general library
-//! does before and after costs as much as the work itself. Loops are written such that the compiler makes vector
-//! instructions of them, and [`vectorise`] compiles a caller together with all that it inlines for the widest ones. No
+//! does before and after costs as much as the work itself. The inner loops are in `kernels`, and [`vectorise`] compiles a caller together with all that it inlines for the widest ones. No
 //! function fuses a multiplication with an addition or sums in an order that depends on the width of a register, so
 //! every machine, WebAssembly too, returns the same bits.
 
 mod cholesky;
 mod eigen;
-mod eigenvalues;
+mod kernels;
 mod matrix;
+mod order;
 mod vector;
 mod vectorise;
 
 pub(crate) use cholesky::{cholesky, cholesky_inverse, cholesky_solve, cholesky_with_ridge};
-pub(crate) use eigen::symmetric_eigen;
-pub(crate) use eigenvalues::symmetric_eigenvalues;
-pub(crate) use matrix::{mirror_upper, multiply, multiply_vector, transpose};
-pub(crate) use vector::{
-    LANES, add_scaled, add_scaled_padded, add_scaled_rows, dot, dot_padded, padded_len,
+pub(crate) use eigen::{symmetric_eigen, symmetric_eigenvalues};
+pub(crate) use kernels::{
+    BLOCK_SLOTS, LANES, add_outer_block, add_products, add_scaled, combine_blocks, combine_slots,
+    dot, multiply_rows, set_scaled_sum,
 };
+pub(crate) use matrix::{mirror_upper, multiply, multiply_vector, transpose};
+pub(crate) use order::{ascending_order, sort};
+pub(crate) use vector::{add_scaled_rows, padded_len};
 pub(crate) use vectorise::vectorise;

@@ -1,62 +1,11 @@
-//! Vector arithmetic: BLAS level 1, and a sum of matrix rows.
+//! A sum of matrix rows, and padding.
 
-/// Partial sums of a dot product: as many `f64` as the widest vector registers hold.
-pub(crate) const LANES: usize = 8;
+use super::kernels::{LANES, add_four_scaled, add_scaled};
 
 /// Returns `n` rounded up to a multiple of [`LANES`].
 #[cfg_attr(target_arch = "x86_64", inline(always))]
 pub(crate) fn padded_len(n: usize) -> usize {
     n.next_multiple_of(LANES)
-}
-
-/// Returns `aᵀb` for vectors whose length is a multiple of [`LANES`].
-#[cfg_attr(target_arch = "x86_64", inline(always))]
-pub(crate) fn dot_padded(a: &[f64], b: &[f64]) -> f64 {
-    dot_lanes(a.as_chunks().0, b.as_chunks().0)
-}
-
-#[cfg_attr(target_arch = "x86_64", inline(always))]
-fn dot_lanes(a: &[[f64; LANES]], b: &[[f64; LANES]]) -> f64 {
-    let mut lanes = [0.0f64; LANES];
-    for (a, b) in a.iter().zip(b) {
-        for lane in 0..LANES {
-            lanes[lane] += a[lane] * b[lane];
-        }
-    }
-    let [a, b, c, d, e, f, g, h] = lanes;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
-}
-
-/// Computes `y += factor · x` for vectors whose length is a multiple of [`LANES`].
-#[cfg_attr(target_arch = "x86_64", inline(always))]
-pub(crate) fn add_scaled_padded(y: &mut [f64], factor: f64, x: &[f64]) {
-    let y = y.as_chunks_mut::<LANES>().0;
-    for (y, x) in y.iter_mut().zip(x.as_chunks::<LANES>().0) {
-        let mut sum = *y;
-        for lane in 0..LANES {
-            sum[lane] += factor * x[lane];
-        }
-        *y = sum;
-    }
-}
-
-/// Returns `aᵀb` for vectors of one length.
-#[cfg_attr(target_arch = "x86_64", inline(always))]
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a_lanes, a_rest), (b_lanes, b_rest)) = (a.as_chunks(), b.as_chunks());
-    let mut rest = 0.0;
-    for (a, b) in a_rest.iter().zip(b_rest) {
-        rest += a * b;
-    }
-    dot_lanes(a_lanes, b_lanes) + rest
-}
-
-/// Computes `y += factor · x`.
-#[cfg_attr(target_arch = "x86_64", inline(always))]
-pub(crate) fn add_scaled(y: &mut [f64], factor: f64, x: &[f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += factor * x;
-    }
 }
 
 /// Computes `y += Σ_i factors[i] · matrix[rows[i]]`, for a `[_, k]` matrix and `y` `[k]`.
@@ -70,17 +19,14 @@ pub(crate) fn add_scaled_rows(y: &mut [f64], matrix: &[f64], rows: &[usize], fac
         add_scaled(y, f, row(m));
     }
     for (m, f) in fours.zip(factor_fours) {
-        let (a, b, c, d) = (row(m[0]), row(m[1]), row(m[2]), row(m[3]));
-        let rows = a.iter().zip(b).zip(c).zip(d);
-        for (y, (((a, b), c), d)) in y.iter_mut().zip(rows) {
-            *y += (f[0] * a + f[1] * b) + (f[2] * c + f[3] * d);
-        }
+        let rows = [row(m[0]), row(m[1]), row(m[2]), row(m[3])];
+        add_four_scaled(y, rows, [f[0], f[1], f[2], f[3]]);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::vectorise;
+    use super::super::{dot, vectorise};
     use super::*;
 
     fn vector(n: usize, seed: usize) -> Vec<f64> {
@@ -94,12 +40,6 @@ mod tests {
         for n in [0, 1, 7, 8, 80, 225] {
             let (a, b) = (vector(n, 1), vector(n, 2));
             assert_eq!(dot(&a, &b).to_bits(), vectorise(|| dot(&a, &b)).to_bits());
-            let whole = n / LANES * LANES;
-            let blocks = (&a[..whole], &b[..whole]);
-            assert_eq!(
-                dot_padded(blocks.0, blocks.1).to_bits(),
-                vectorise(|| dot_padded(blocks.0, blocks.1)).to_bits()
-            );
             let (matrix, factors) = (vector(7 * n, 3), vector(6, 4));
             let rows = [6, 0, 3, 2, 5, 1];
             let (mut plain, mut wide) = (a.clone(), a.clone());
@@ -107,17 +47,6 @@ mod tests {
             vectorise(|| add_scaled_rows(&mut wide, &matrix, &rows, &factors));
             assert_eq!(plain, wide);
         }
-    }
-
-    #[test]
-    fn padded_functions_agree_with_plain_ones() {
-        let (a, b) = (vector(24, 1), vector(24, 2));
-        assert!((dot_padded(&a, &b) - dot(&a, &b)).abs() < 1e-9);
-        let (mut padded, mut plain) = (a.clone(), a);
-        add_scaled_padded(&mut padded, 0.5, &b);
-        add_scaled(&mut plain, 0.5, &b);
-        assert_eq!(padded, plain);
-        assert_eq!([0, 1, 8, 9].map(padded_len), [0, 8, 8, 16]);
     }
 
     #[test]

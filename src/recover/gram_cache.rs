@@ -8,7 +8,7 @@
 use super::common_mode_weight::CommonModeWeight;
 use super::normal_equations::{EquationWeights, WeightedColumns};
 use crate::capture::Measurements;
-use crate::linalg::{dot, vectorise};
+use crate::linalg::{add_scaled, dot, vectorise};
 use crate::transport::{ClippedRect, Extent, Geometry, LightElement, Window};
 
 /// Largest table of correlations that one thread may have in memory.
@@ -240,10 +240,7 @@ fn offsets(window: Window) -> usize {
 #[cfg_attr(target_arch = "x86_64", inline(always))]
 fn subtract_outer_product(a: &mut [f64], factor: f64, v: &[f64]) {
     for (row, x) in a.chunks_exact_mut(v.len().max(1)).zip(v) {
-        let scaled = factor * x;
-        for (a, y) in row.iter_mut().zip(v) {
-            *a -= scaled * y;
-        }
+        add_scaled(row, -factor * x, v);
     }
 }
 

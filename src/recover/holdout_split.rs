@@ -42,11 +42,16 @@ impl HoldoutSplit {
 
 /// Ids of the patterns, from 0 in order of appearance; equal patterns have one id.
 pub(super) fn pattern_ids(patterns: &[Pattern]) -> Vec<usize> {
-    let bits = |pattern: &Pattern| -> Vec<u32> {
-        let planes = (0..CHANNELS).map(|c| pattern.plane(c));
-        planes.flatten().map(|p| p.to_bits()).collect()
-    };
-    capture::group_ids(patterns.iter().map(bits))
+    capture::group_ids(patterns.iter().map(Planes))
+}
+
+/// A pattern, equal to another if all planes are, grey or not.
+struct Planes<'a>(&'a Pattern);
+
+impl PartialEq for Planes<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        (0..CHANNELS).all(|c| self.0.plane(c) == other.0.plane(c))
+    }
 }
 
 #[cfg(test)]

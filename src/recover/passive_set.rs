@@ -8,7 +8,9 @@
 //! Sets are small and of every size. A loop that ended with the set would spend most of its time on the remainder after
 //! the last full vector register, so all vectors are padded with zeros to a multiple of [`LANES`].
 
-use crate::linalg::{LANES, add_scaled_padded, add_scaled_rows, dot_padded, padded_len};
+use crate::linalg::{
+    LANES, add_outer_block, add_scaled, add_scaled_rows, combine_blocks, dot, padded_len,
+};
 
 /// The values of one vector register, or of a few.
 type RegisterBlock = [f64; LANES];
@@ -142,7 +144,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         self.multiply_by_inverse();
         let width = self.padded_len();
         let solution = &mut self.solutions[which][..width];
-        add_scaled_padded(solution, 1.0, &self.product[..width]);
+        add_scaled(solution, 1.0, &self.product[..width]);
     }
 
     /// Sets `column = b[P]`.
@@ -165,13 +167,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         let product = self.product.as_chunks_mut::<LANES>().0;
         let inverse = self.inverse.chunks_exact(self.stride.max(1));
         for (p, panel) in product[..width / LANES].iter_mut().zip(inverse) {
-            let mut sum = [0.0; LANES];
-            for ([a, b, c, d], f) in panel.as_chunks::<ROWS_PER_PASS>().0.iter().zip(factors) {
-                for i in 0..LANES {
-                    sum[i] += (f[0] * a[i] + f[1] * b[i]) + (f[2] * c[i] + f[3] * d[i]);
-                }
-            }
-            *p = sum;
+            *p = combine_blocks(panel, factors);
         }
     }
 
@@ -183,7 +179,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         let column = &self.column[..self.padded_len()];
         let mut residual = b;
         for (residual, z) in residual.iter_mut().zip(&self.solutions) {
-            *residual -= dot_padded(column, &z[..column.len()]);
+            *residual -= dot(column, &z[..column.len()]);
         }
         EnteringUnknown {
             j,
@@ -205,7 +201,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     pub fn insert(&mut self, candidate: EnteringUnknown<N>) -> bool {
         self.multiply_by_inverse();
         let (n, before) = (self.members.len(), self.padded_len());
-        let explained = dot_padded(&self.column[..before], &self.product[..before]);
+        let explained = dot(&self.column[..before], &self.product[..before]);
         let pivot = candidate.diagonal - explained;
         if pivot.is_nan() || pivot <= MIN_PIVOT_RATIO * candidate.diagonal {
             return false;
@@ -216,7 +212,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         let inverse = 1.0 / pivot;
         for (z, residual) in self.solutions.iter_mut().zip(candidate.residual) {
             let step = residual * inverse;
-            add_scaled_padded(&mut z[..before], -step, &self.product[..before]);
+            add_scaled(&mut z[..before], -step, &self.product[..before]);
             z[n] = step;
         }
         // With −1 as the new member's entry, one outer product updates all of the inverse.
@@ -237,17 +233,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         let blocks = product.as_chunks::<LANES>().0;
         let factors = product.as_chunks::<ROWS_PER_PASS>().0;
         for (panel, block) in panels(&mut self.inverse, self.stride, width).zip(blocks) {
-            let block = block.map(|v| v * factor);
-            let rows = panel.as_chunks_mut::<ROWS_PER_PASS>().0.iter_mut();
-            for (rows, factors) in rows.zip(factors) {
-                let mut sums = *rows;
-                for (sum, v) in sums.iter_mut().zip(factors) {
-                    for lane in 0..LANES {
-                        sum[lane] += v * block[lane];
-                    }
-                }
-                *rows = sums;
-            }
+            add_outer_block(panel, factors, block.map(|v| v * factor));
         }
     }
 
@@ -263,7 +249,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
         let inverse = 1.0 / self.product[i];
         for z in &mut self.solutions {
             let step = z[i] * inverse;
-            add_scaled_padded(&mut z[..width], -step, &self.product[..width]);
+            add_scaled(&mut z[..width], -step, &self.product[..width]);
             z[i] = z[last];
             z[last] = 0.0;
         }

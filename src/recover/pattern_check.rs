@@ -12,6 +12,7 @@ use super::error::RecoverError;
 use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, PixelsSharingWindow};
 use crate::job_executor::Executor;
+use crate::linalg;
 use crate::transport::{LightElement, TileRect};
 
 /// Smallest slope of a photograph that matches its pattern, relative to [`REFERENCE_PERCENTILE`].
@@ -53,7 +54,7 @@ pub(super) async fn check_patterns(
     let slope = |&l: &usize| SlopeEstimate::fit(&moments, &[l]);
     let slopes: Vec<Option<SlopeEstimate>> = split.all.iter().map(slope).collect();
     let mut values: Vec<f64> = slopes.iter().flatten().map(|slope| slope.value).collect();
-    values.sort_by(f64::total_cmp);
+    linalg::sort(&mut values);
     let reference = values.get(values.len() * REFERENCE_PERCENTILE / 100);
     let min_slope = MIN_SLOPE_RATIO * reference.copied().unwrap_or(0.0);
     let is_mismatched = |&l: &usize| slopes[l].is_some_and(|slope| slope.is_below(min_slope));

@@ -19,8 +19,8 @@ use super::preparation_input;
 use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::{Measurements, group_count};
 use crate::job_executor::{Executor, PARTS, set_values, values};
-use crate::linalg::{self, add_scaled, vectorise};
-use crate::transport::{Geometry, LightElement, Window};
+use crate::linalg::{self, add_scaled, ascending_order, vectorise};
+use crate::transport::{Geometry, LightElement, TileRect, Window};
 
 /// Side of the widest window that is searched.
 const MAX_SIDE: u32 = 31;
@@ -80,9 +80,12 @@ impl WindowSizeEstimate {
         let max_side = MAX_SIDE.min((light.width.min(light.height) / 2).saturating_sub(1) | 1);
         let geometry = preparation_input::geometry(measurements, Window::new(max_side)?)?;
         let rings = WindowRings::new(max_side, group_count(&pattern_ids(&measurements.patterns)));
-        let mut squares = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
+        let squares = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
         // Errors of neighbouring squares are correlated: each part is a strip of the picture.
-        squares.sort_by_key(|square| (square.y, square.x));
+        let position =
+            |square: &TileRect| f64::from(square.y) * f64::from(1 << 24) + f64::from(square.x);
+        let order = ascending_order(squares.iter().map(position));
+        let squares: Vec<TileRect> = order.into_iter().map(|i| squares[i]).collect();
         executor.check_cancelled()?;
         // A part of the picture for each job, and for the jackknife.
         let sum_part = |part: usize| {

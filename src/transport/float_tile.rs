@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::geometry::{CHANNELS, Geometry, TileRect};
+use crate::linalg::{BLOCK_SLOTS, combine_slots};
 
 /// The basis functions `v_k` of a factored transport, `S` values each.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -141,10 +142,6 @@ impl From<TileTransportFunctions> for FloatTile {
     }
 }
 
-/// Slots computed together. The sums of three channels take nine of sixteen four-lane registers, which leaves enough
-/// for the basis function and the coefficients.
-const BLOCK_SLOTS: usize = 12;
-
 /// Adds `Σ_k c_k v_k` to `tau`, `[pixel, slot]`, and zeroes elements off the light plane.
 fn add_expansion(
     tau: &mut [[f32; CHANNELS]],
@@ -164,32 +161,13 @@ fn add_expansion(
     let pixels = rect.pixels().zip(tau.chunks_exact_mut(area));
     for ((pixel, tau), coefficients) in pixels.zip(coefficients.chunks_exact(rank)) {
         for (tau, kernels) in tau.chunks_mut(BLOCK_SLOTS).zip(kernels.chunks_exact(rank)) {
-            let sums = combine(coefficients, kernels);
+            let sums = combine_slots(coefficients, kernels);
             for (s, tau) in tau.iter_mut().enumerate() {
                 (0..CHANNELS).for_each(|c| tau[c] += sums[c][s]);
             }
         }
         geometry.zero_off_light_plane(geometry.window_origin(pixel), tau);
     }
-}
-
-/// `Σ_k c_k v_k` on one block of slots by channel. Sums run over `k` in order, so that results do not depend on the
-/// size of blocks.
-fn combine(
-    coefficients: &[[f32; CHANNELS]],
-    kernels: &[[f32; BLOCK_SLOTS]],
-) -> [[f32; BLOCK_SLOTS]; CHANNELS] {
-    // Three variables instead of an array, which the compiler would keep in memory.
-    let (mut red, mut green, mut blue) =
-        ([0.0; BLOCK_SLOTS], [0.0; BLOCK_SLOTS], [0.0; BLOCK_SLOTS]);
-    for ([r, g, b], kernel) in coefficients.iter().zip(kernels) {
-        for (s, v) in kernel.iter().enumerate() {
-            red[s] += r * v;
-            green[s] += g * v;
-            blue[s] += b * v;
-        }
-    }
-    [red, green, blue]
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl Iterate {
                 let mu = total / (2 * coefficients.len() + x.len() + 1) as f64;
                 let t: Vec<f64> = coefficients
                     .iter()
-                    .map(|c| mu + libm::hypot(mu, *c))
+                    .map(|c| mu + (mu * mu + c * c).sqrt())
                     .collect();
                 return Some(Self {
                     s: coefficients.iter().zip(&t).map(|(c, t)| c / t).collect(),

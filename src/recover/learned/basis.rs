@@ -8,11 +8,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::capture::Measurements;
-use crate::linalg::vectorise;
+use crate::linalg::{multiply_rows, vectorise};
 use crate::transport::{Basis, Geometry, LightElement};
 
 /// Responses computed together at least: two vector registers of f32 on the narrowest machine of note.
-const MIN_BLOCK_WIDTH: usize = 8;
+const RESPONSE_BLOCK: usize = 8;
 
 /// An orthonormal basis of functions on the window, and the mean light transport function.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -28,7 +28,7 @@ impl LearnedBasis {
     pub fn new(functions: &[f64], mean: &[f64]) -> Self {
         let area = mean.len();
         let rank = functions.len() / area;
-        let stride = (rank + 1).next_multiple_of(MIN_BLOCK_WIDTH);
+        let stride = (rank + 1).next_multiple_of(RESPONSE_BLOCK);
         let mut interleaved = vec![0.0; area * stride];
         for (s, values) in interleaved.chunks_exact_mut(stride).enumerate() {
             for k in 0..rank {
@@ -81,7 +81,7 @@ impl LearnedBasis {
             }
             vectorise(
                 #[cfg_attr(target_arch = "x86_64", inline(always))]
-                || multiply(&emission, &functions, responses),
+                || multiply_rows(&emission, &functions, responses),
             );
         }
         PatternResponses {
@@ -115,39 +115,4 @@ impl PatternResponses {
     pub fn mean(&self, l: usize) -> f64 {
         f64::from(self.responses[l * self.stride + self.rank])
     }
-}
-
-/// `row = emission · functions`, `functions` `[element, stride]`.
-#[cfg_attr(target_arch = "x86_64", inline(always))]
-fn multiply(emission: &[f32], functions: &[f32], row: &mut [f32]) {
-    let stride = row.len();
-    let mut at = 0;
-    // As many sums at a time as the registers of the machine hold, then fewer for the rest.
-    while at < stride {
-        match stride - at {
-            32.. => at += multiply_block::<32>(emission, functions, row, at),
-            16.. => at += multiply_block::<16>(emission, functions, row, at),
-            _ => at += multiply_block::<MIN_BLOCK_WIDTH>(emission, functions, row, at),
-        }
-    }
-}
-
-/// Entries `at..at + WIDTH` of `row`; returns `WIDTH`.
-#[cfg_attr(target_arch = "x86_64", inline(always))]
-fn multiply_block<const WIDTH: usize>(
-    emission: &[f32],
-    functions: &[f32],
-    row: &mut [f32],
-    at: usize,
-) -> usize {
-    let mut sums = [0.0f32; WIDTH];
-    for (p, functions) in emission.iter().zip(functions.chunks_exact(row.len())) {
-        if let Some(values) = functions[at..].first_chunk::<WIDTH>() {
-            for (sum, v) in sums.iter_mut().zip(values) {
-                *sum += p * v;
-            }
-        }
-    }
-    row[at..at + WIDTH].copy_from_slice(&sums);
-    WIDTH
 }

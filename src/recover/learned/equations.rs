@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use super::basis::{LearnedBasis, PatternResponses};
 use crate::capture::Measurements;
-use crate::linalg::{dot, vectorise};
+use crate::linalg::{dot, sort, vectorise};
 use crate::recover::common_mode_weight::CommonModeWeight;
 use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
 use crate::recover::sampling::{PixelsSharingWindow, pixels_by_window, usable_samples};
@@ -185,7 +185,7 @@ pub(super) fn min_reliable_brightness(brightnesses: &[f64]) -> MinReliableBright
             .step_by(CHANNELS)
             .copied()
             .collect();
-        of_channel.sort_by(f64::total_cmp);
+        sort(&mut of_channel);
         let bright = of_channel.get(of_channel.len() * BRIGHT_PERCENTILE / 100);
         MIN_RELATIVE_BRIGHTNESS * bright.copied().unwrap_or(0.0)
     })

@@ -54,7 +54,8 @@ pub(super) fn initial_prior(
     let covariance = executor.map(area, |s| {
         let (v, u) = ((s / side) as f64, (s % side) as f64);
         let row = (0..area).map(|t| {
-            let distance = libm::hypot(v - (t / side) as f64, u - (t % side) as f64);
+            let (dv, du) = (v - (t / side) as f64, u - (t % side) as f64);
+            let distance = (dv * dv + du * du).sqrt();
             RELATIVE_VARIANCE * mean[s] * mean[t] * libm::exp(-distance / CORRELATION_LENGTH)
         });
         row.collect::<Vec<f64>>()

@@ -26,12 +26,12 @@ use std::slice::from_mut;
 use serde::{Deserialize, Serialize};
 
 use super::equations::PHASES;
-use super::neighbour_regression::{RegressionSums, add_products, solve_regressions};
+use super::neighbour_regression::{RegressionSums, solve_regressions};
 use super::posterior::{PosteriorSolver, PriorPrecision, SecondMoment};
 use super::posterior_means::{PREDICTORS, PixelObservationPosition, PosteriorMeans};
 use super::prior::Prior;
 use crate::job_executor::{Cancelled, Executor, Sums};
-use crate::linalg::{self, add_scaled, vectorise};
+use crate::linalg::{self, add_products, add_scaled, vectorise};
 use crate::recover::partition::Partition;
 use crate::transport::CHANNELS;
 

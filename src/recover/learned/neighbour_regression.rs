@@ -6,7 +6,7 @@
 
 use super::posterior_means::{PREDICTORS, PixelObservationPosition, PosteriorMeans};
 use crate::job_executor::Sums;
-use crate::linalg;
+use crate::linalg::{self, add_products};
 
 /// Ridge, as a share of the predictors' mean square, that keeps the regressions well posed.
 const RIDGE: f64 = 1e-3;
@@ -101,14 +101,6 @@ pub(super) fn solve_regressions(factors: &[f64], right_hand_side: &[f64], rank: 
         (0..PREDICTORS).for_each(|j| weights[j * rank + k] = b[j]);
     }
     weights
-}
-
-/// `sums += a ∘ b`, entry by entry.
-#[cfg_attr(target_arch = "x86_64", inline(always))]
-pub(super) fn add_products(sums: &mut [f64], a: &[f64], b: &[f64]) {
-    for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-        *sum += a * b;
-    }
 }
 
 #[cfg(test)]

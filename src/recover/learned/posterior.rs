@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::equations::ObservationEquations;
 use crate::job_executor::Sums;
-use crate::linalg::{self, add_scaled, dot};
+use crate::linalg::{self, add_scaled, dot, set_scaled_sum};
 
 /// Smallest variance along any direction, as a share of the mean variance: keeps the inverse finite.
 const MIN_VARIANCE_SHARE: f64 = 1e-9;
@@ -94,9 +94,7 @@ impl PosteriorSolver {
         let (gram, right) = (equations.gram(index), equations.right_hand_side(index));
         let (f, variance) = (observation.brightness, observation.variance * noise);
         let (a, b) = (f * f / variance, f / variance);
-        for ((x, p), g) in self.factor.iter_mut().zip(&prior.matrix).zip(gram) {
-            *x = p + a * g;
-        }
+        set_scaled_sum(&mut self.factor, &prior.matrix, a, gram);
         linalg::multiply_vector(gram, prior_mean, &mut self.product);
         for k in 0..rank {
             self.gradient[k] = b * (right[k] - f * self.product[k]);
