@@ -37,12 +37,14 @@ const LIMITS_KB = {
   js_brotli_kb: 25,
   first_picture_wasm_brotli_kb: 110,
   all_wasm_brotli_kb: 180,
+  recover_wasm_brotli_kb: 200,
 };
 const TITLES = {
   js_brotli_kb: 'the element',
   first_picture_wasm_brotli_kb:
     'WebAssembly for a first picture: the decoder and the largest backend',
   all_wasm_brotli_kb: 'all WebAssembly modules of the element',
+  recover_wasm_brotli_kb: 'WebAssembly of recovery and the writer',
 };
 
 /** @param {string} name of a file in dist @returns {number} kilobytes */
@@ -90,9 +92,6 @@ for (const key of /** @type {(keyof typeof LIMITS_KB)[]} */ (Object.keys(LIMITS_
   console.log(`${kb.toFixed(1).padStart(7)} kB of ${limit} kB  ${TITLES[key]}: ${verdict}`);
   if (kb > limit) process.exitCode = 1;
 }
-// Its target of 200 kB is not reached yet, so that it is no limit.
-const recovery = figures.recover_wasm_brotli_kb.toFixed(1).padStart(7);
-console.log(`${recovery} kB  WebAssembly of recovery and the writer (target: 200 kB)`);
 const reader = figures.capture_reader_wasm_brotli_kb.toFixed(1).padStart(7);
 console.log(`${reader} kB  WebAssembly that reads captures`);
 const scripts = sum(modules.map(({ scripts }) => scripts));
