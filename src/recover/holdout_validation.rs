@@ -20,8 +20,10 @@ use crate::transport::{
     Basis, CHANNELS, Decibels, FloatTile, Geometry, TileRect, TileTransportFunctions,
 };
 
-/// Squares of the picture that are validated.
+/// Squares of the picture that are validated: at most half of them, as validation takes as long for each as its recovery,
+/// but at least so many.
 const MAX_SQUARES: usize = 96;
+const MIN_SQUARES: usize = 32;
 /// Their side in camera pixels: that of a file's blocks.
 const SQUARE_SIDE: u32 = 8;
 /// Fewest held-out patterns, or unsaturated measurements under them, that have a variance.
@@ -74,7 +76,9 @@ impl HoldoutValidation {
         if group_count(&pattern_ids(&held_out)) < MIN_HELD_OUT {
             return Ok(None);
         }
-        let rects = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
+        let squares = |max| sampling::spread_squares(measurements, SQUARE_SIDE, max);
+        let half = squares(2 * MAX_SQUARES).len() / 2;
+        let rects = squares(half.max(MIN_SQUARES));
         let samples = |i: usize| prediction::samples(measurements, &split.held_out, rects[i]);
         let samples = executor.map(rects.len(), samples);
         let own = executor.own_jobs(rects.len());

@@ -26,8 +26,10 @@ const ROUNDS: usize = 3;
 /// what limits a pixel's certainty where noise is low.
 const MODEL_DEVIATION: f64 = 0.1;
 
-/// Squares of the picture that are used, and their side in camera pixels.
+/// Squares of the picture that are used, one in so many of them in the rounds before the last, and their side in camera
+/// pixels.
 const MAX_SQUARES: usize = 128;
+const EARLY_SAMPLING: usize = 4;
 const SQUARE_SIDE: u32 = 4;
 /// Upper bound on the pixels and channels in these squares.
 pub(super) const MAX_SAMPLES: usize = MAX_SQUARES * (SQUARE_SIDE * SQUARE_SIDE) as usize * CHANNELS;
@@ -52,12 +54,16 @@ pub(super) async fn mean_function(
     let squares = sample_squares(preparation.measurements);
     let area = preparation.geometry.window.area();
     let mut mean = vec![1.0 / area as f64; area];
-    for _ in 0..ROUNDS {
+    let sample: Vec<_> = squares.iter().step_by(EARLY_SAMPLING).copied().collect();
+    for round in 1..=ROUNDS {
         preparation.executor.check_cancelled()?;
-        let function = fit_round(preparation, &squares, &mean).await?;
+        // A small picture needs all of its few squares.
+        let is_early = round < ROUNDS && squares.len() == MAX_SQUARES;
+        let squares = if is_early { &sample } else { &squares };
+        let function = fit_round(preparation, squares, &mean).await?;
         let sum: f64 = function.iter().sum();
         if sum.is_nan() || sum <= 0.0 {
-            return Err(dark_or_overexposed(preparation.measurements, &squares));
+            return Err(dark_or_overexposed(preparation.measurements, squares));
         }
         mean = function.iter().map(|m| m / sum).collect();
     }

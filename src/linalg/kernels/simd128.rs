@@ -86,7 +86,7 @@ fn add_product_single(y: v128, a: v128, b: v128) -> v128 {
     f32x4_add(y, f32x4_mul(a, b))
 }
 
-/// Computes `y[i] = f(y[i], a[i], b[i])`: by two vectors, and by `scalar` for up to three entries at the end.
+/// Computes `y[i] = f(y[i], a[i], b[i])`: by two vectors, and by one and by `scalar` for up to three entries at the end.
 #[inline(always)]
 fn update(
     y: &mut [f64],
@@ -104,7 +104,15 @@ fn update(
         store(y0, vector(load(y0), load(a0), load(b0)));
         store(y1, vector(load(y1), load(a1), load(b1)));
     }
-    for ((y, a), b) in y_rest.iter_mut().zip(a_rest).zip(b_rest) {
+    let ((y, y_last), (a, a_last), (b, b_last)) = (
+        y_rest.as_chunks_mut(),
+        a_rest.as_chunks(),
+        b_rest.as_chunks(),
+    );
+    if let ([y], [a], [b]) = (y, a, b) {
+        store(y, vector(load(y), load(a), load(b)));
+    }
+    if let ([y], [a], [b]) = (y_last, a_last, b_last) {
         *y = scalar(*y, *a, *b);
     }
 }
@@ -158,8 +166,19 @@ pub(crate) fn add_four_scaled(y: &mut [f64], [a, b, c, d]: [&[f64]; 4], f: [f64;
         store(y0, f64x2_add(load(y0), first));
         store(y1, f64x2_add(load(y1), second));
     }
-    let rests = a_rest.iter().zip(b_rest).zip(c_rest).zip(d_rest);
-    for (y, (((a, b), c), d)) in y_rest.iter_mut().zip(rests) {
+    let ((y, y_last), (a, a_last), (b, b_last)) = (
+        y_rest.as_chunks_mut(),
+        a_rest.as_chunks(),
+        b_rest.as_chunks(),
+    );
+    let ((c, c_last), (d, d_last)) = (c_rest.as_chunks(), d_rest.as_chunks());
+    if let ([y], [a], [b], [c], [d]) = (y, a, b, c, d) {
+        store(
+            y,
+            f64x2_add(load(y), sum(load(a), load(b), load(c), load(d))),
+        );
+    }
+    if let ([y], [a], [b], [c], [d]) = (y_last, a_last, b_last, c_last, d_last) {
         *y += (f[0] * a + f[1] * b) + (f[2] * c + f[3] * d);
     }
 }

@@ -17,7 +17,7 @@ use crate::linalg::{self, add_scaled, dot};
 /// Rank of the initial basis; with the mean function a whole number of vector registers.
 pub(super) const MAX_INITIAL_RANK: usize = 95;
 /// Rounds of subspace iteration: the basis needs to span the leading eigenvectors, not to equal them.
-const SUBSPACE_ITERATIONS: usize = 12;
+const SUBSPACE_ITERATIONS: usize = 4;
 /// Correlation length, in elements. Twice as much is too smooth for textured glass, and training does not make up for
 /// what the initial basis lacks.
 const CORRELATION_LENGTH: f64 = 1.0;

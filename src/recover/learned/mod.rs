@@ -49,6 +49,7 @@ use crate::transport::{
 use inference::LearnedModel;
 use nnls_blending::{BlendingGram, MIN_TILE_GAIN, TILE_CENTRE_SIDE_PX, fit_nnls_alternative};
 pub(super) use posterior_means::NEIGHBOURHOOD_RADIUS as MAX_HALO;
+use training::FINAL_EM_ITERATIONS;
 pub(super) use training::{max_rank, preparation_bytes};
 
 /// The learned model and, where blending pays, non-negative least squares.
@@ -80,7 +81,8 @@ impl LearnedRecovery {
         let mut model = preparation.fit_basis(mean_function).await?;
         executor.check_cancelled()?;
         let regions = preparation.training_regions(model.basis.rank()).await?;
-        let training = preparation.fit_priors(&mut model, &split.training, &regions, true);
+        let [first, second] = FINAL_EM_ITERATIONS;
+        let training = preparation.fit_priors(&mut model, &split.training, &regions, first, true);
         training.await?;
         let mut nnls = None;
         if !split.held_out.is_empty() {
@@ -91,7 +93,7 @@ impl LearnedRecovery {
             // All choices are made: train on the held-out patterns, too.
             executor.check_cancelled()?;
             let helps = model.neighbour_prior.is_some();
-            let training = preparation.fit_priors(&mut model, &split.all, &regions, helps);
+            let training = preparation.fit_priors(&mut model, &split.all, &regions, second, helps);
             training.await?;
         }
         Ok(Self { model, nnls })
