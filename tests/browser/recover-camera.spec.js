@@ -123,6 +123,46 @@ test('photographs patterns on a second screen, and recovers as ltm-export does',
   expect(Math.abs(heldOut - native)).toBeLessThan(0.1);
 });
 
+test('says why there is no camera, or no pattern window', async ({ openPage, step }) => {
+  const page = await openPage('/recover.html', { permissions: ['camera'] });
+  const fault = page.getByRole('alert');
+  const start = page.getByRole('button', { name: 'Start the camera' });
+  await page.getByLabel('Your camera and a second screen').check();
+
+  for (const [error, code] of [
+    ['NotFoundError', 'camera-missing'],
+    ['NotReadableError', 'camera-busy'],
+  ]) {
+    await step(`the browser answers ${error}`, async () => {
+      await page.evaluate((error) => {
+        navigator.mediaDevices.getUserMedia = () => Promise.reject(new DOMException('', error));
+      }, error);
+      await start.click();
+      await expect(fault).toContainText(`Code: ${code}`);
+      await expect(start).toBeEnabled();
+    });
+  }
+
+  await step('the browser gives pages no camera', async () => {
+    // As in a page without a secure connection.
+    await page.evaluate(() =>
+      Object.defineProperty(navigator, 'mediaDevices', { value: undefined, configurable: true }),
+    );
+    await start.click();
+    await expect(fault).toContainText('Code: camera-unsupported');
+  });
+
+  await step('the pattern window is blocked', async () => {
+    await page.evaluate(() => {
+      window.open = () => null;
+    });
+    const open = page.getByRole('button', { name: 'Open the pattern window' });
+    await open.click();
+    await expect(fault).toContainText('Code: patterns-blocked');
+    await expect(open).toBeEnabled();
+  });
+});
+
 test('says what is at fault, with a code', async ({ openPage, step }) => {
   const page = await openPage('/recover.html');
   const fault = page.getByRole('alert');

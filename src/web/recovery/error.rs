@@ -6,9 +6,9 @@ use crate::transport::GeometryError;
 use crate::web::CodedError;
 use crate::web::recovery_error::with_remedy;
 
-/// The error for bytes that the other worker cannot have sent.
+/// The error for bytes that another worker or module cannot have sent.
 pub(super) fn corrupt() -> CodedError {
-    CodedError::internal("a recovery was corrupted on its way from its worker")
+    CodedError::internal("data was corrupted on its way from another worker or module")
 }
 
 impl From<RecoverError> for CodedError {
