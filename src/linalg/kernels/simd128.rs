@@ -2,52 +2,46 @@
 
 use std::arch::wasm32::{
     f32x4_add, f32x4_mul, f32x4_splat, f64x2_add, f64x2_extract_lane, f64x2_mul, f64x2_splat, v128,
-    v128_load, v128_store,
 };
 
-use bytemuck::{cast_mut, cast_ref};
+use bytemuck::{Pod, must_cast, must_cast_mut, must_cast_ref};
 
 use super::{BLOCK_SLOTS, LANES};
 
+/// The vector of two or four values.
 #[inline(always)]
-fn load(values: &[f64; 2]) -> v128 {
-    // SAFETY: the reference is to 16 readable bytes; loads need no alignment.
-    unsafe { v128_load(values.as_ptr().cast()) }
+fn load<T: Pod>(values: &T) -> v128 {
+    must_cast(*values)
 }
 
 #[inline(always)]
-fn store(values: &mut [f64; 2], vector: v128) {
-    // SAFETY: the reference is to 16 writable bytes; stores need no alignment.
-    unsafe { v128_store(values.as_mut_ptr().cast(), vector) }
+fn store<T: Pod>(values: &mut T, vector: v128) {
+    *values = must_cast(vector);
 }
 
+/// Stores vectors one after the other, as far as `values` go.
 #[inline(always)]
-fn load_single(values: &[f32; 4]) -> v128 {
-    // SAFETY: the reference is to 16 readable bytes; loads need no alignment.
-    unsafe { v128_load(values.as_ptr().cast()) }
-}
-
-#[inline(always)]
-fn store_single(values: &mut [f32; 4], vector: v128) {
-    // SAFETY: the reference is to 16 writable bytes; stores need no alignment.
-    unsafe { v128_store(values.as_mut_ptr().cast(), vector) }
+fn store_all<const N: usize>(values: &mut [f32], vectors: [v128; N]) {
+    for (to, vector) in values.as_chunks_mut::<4>().0.iter_mut().zip(vectors) {
+        store(to, vector);
+    }
 }
 
 #[inline(always)]
 fn pairs(four: &[f64; 4]) -> &[[f64; 2]; 2] {
-    cast_ref(four)
+    must_cast_ref(four)
 }
 
 /// The vectors of a block.
 #[inline(always)]
 fn load_block(block: &[f64; LANES]) -> [v128; 4] {
-    let [a, b, c, d]: &[[f64; 2]; 4] = cast_ref(block);
+    let [a, b, c, d]: &[[f64; 2]; 4] = must_cast_ref(block);
     [load(a), load(b), load(c), load(d)]
 }
 
 #[inline(always)]
 fn store_block(block: &mut [f64; LANES], [a, b, c, d]: [v128; 4]) {
-    let [to_a, to_b, to_c, to_d]: &mut [[f64; 2]; 4] = cast_mut(block);
+    let [to_a, to_b, to_c, to_d]: &mut [[f64; 2]; 4] = must_cast_mut(block);
     store(to_a, a);
     store(to_b, b);
     store(to_c, c);
@@ -99,15 +93,15 @@ fn update(
     let (y, y_rest) = y[..n].as_chunks_mut::<4>();
     let ((a, a_rest), (b, b_rest)) = (a[..n].as_chunks::<4>(), b[..n].as_chunks::<4>());
     for ((y, a), b) in y.iter_mut().zip(a).zip(b) {
-        let [y0, y1]: &mut [[f64; 2]; 2] = cast_mut(y);
+        let [y0, y1]: &mut [[f64; 2]; 2] = must_cast_mut(y);
         let ([a0, a1], [b0, b1]) = (pairs(a), pairs(b));
         store(y0, vector(load(y0), load(a0), load(b0)));
         store(y1, vector(load(y1), load(a1), load(b1)));
     }
     let ((y, y_last), (a, a_last), (b, b_last)) = (
-        y_rest.as_chunks_mut(),
-        a_rest.as_chunks(),
-        b_rest.as_chunks(),
+        y_rest.as_chunks_mut::<2>(),
+        a_rest.as_chunks::<2>(),
+        b_rest.as_chunks::<2>(),
     );
     if let ([y], [a], [b]) = (y, a, b) {
         store(y, vector(load(y), load(a), load(b)));
@@ -125,7 +119,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
         sums = add_block_product(sums, load_block(a), load_block(b));
     }
     let [mut ab, mut cd, ef, gh] = sums;
-    let ((a, a_rest), (b, b_rest)) = (a_rest.as_chunks(), b_rest.as_chunks());
+    let ((a, a_rest), (b, b_rest)) = (a_rest.as_chunks::<4>(), b_rest.as_chunks::<4>());
     if let ([a], [b]) = (a, b) {
         let ([a0, a1], [b0, b1]) = (pairs(a), pairs(b));
         ab = add_product(ab, load(a0), load(b0));
@@ -158,7 +152,7 @@ pub(crate) fn add_four_scaled(y: &mut [f64], [a, b, c, d]: [&[f64]; 4], f: [f64;
     let ((a, a_rest), (b, b_rest)) = (a[..n].as_chunks::<4>(), b[..n].as_chunks::<4>());
     let ((c, c_rest), (d, d_rest)) = (c[..n].as_chunks::<4>(), d[..n].as_chunks::<4>());
     for ((((y, a), b), c), d) in y.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        let [y0, y1]: &mut [[f64; 2]; 2] = cast_mut(y);
+        let [y0, y1]: &mut [[f64; 2]; 2] = must_cast_mut(y);
         let ([a0, a1], [b0, b1]) = (pairs(a), pairs(b));
         let ([c0, c1], [d0, d1]) = (pairs(c), pairs(d));
         let first = sum(load(a0), load(b0), load(c0), load(d0));
@@ -167,11 +161,11 @@ pub(crate) fn add_four_scaled(y: &mut [f64], [a, b, c, d]: [&[f64]; 4], f: [f64;
         store(y1, f64x2_add(load(y1), second));
     }
     let ((y, y_last), (a, a_last), (b, b_last)) = (
-        y_rest.as_chunks_mut(),
-        a_rest.as_chunks(),
-        b_rest.as_chunks(),
+        y_rest.as_chunks_mut::<2>(),
+        a_rest.as_chunks::<2>(),
+        b_rest.as_chunks::<2>(),
     );
-    let ((c, c_last), (d, d_last)) = (c_rest.as_chunks(), d_rest.as_chunks());
+    let ((c, c_last), (d, d_last)) = (c_rest.as_chunks::<2>(), d_rest.as_chunks::<2>());
     if let ([y], [a], [b], [c], [d]) = (y, a, b, c, d) {
         store(
             y,
@@ -237,41 +231,38 @@ pub(crate) fn add_outer_block(
 pub(crate) fn multiply_rows(factors: &[f32], rows: &[f32], row: &mut [f32]) {
     let stride = row.len();
     let mut at = 0;
-    // As many sums at a time as registers are sure to hold.
+    // As many sums at a time as registers are sure to hold. They are written out: a loop over them, compiled for size,
+    // would keep them in memory.
     while at + 16 <= stride {
         let mut sums = [f32x4_splat(0.0); 4];
         for (p, values) in factors.iter().zip(rows.chunks_exact(stride)) {
             if let Some(values) = values[at..].first_chunk::<16>() {
-                let [a, b, c, d]: &[[f32; 4]; 4] = cast_ref(values);
+                let [a, b, c, d]: &[[f32; 4]; 4] = must_cast_ref(values);
                 let p = f32x4_splat(*p);
                 sums = [
-                    add_product_single(sums[0], p, load_single(a)),
-                    add_product_single(sums[1], p, load_single(b)),
-                    add_product_single(sums[2], p, load_single(c)),
-                    add_product_single(sums[3], p, load_single(d)),
+                    add_product_single(sums[0], p, load(a)),
+                    add_product_single(sums[1], p, load(b)),
+                    add_product_single(sums[2], p, load(c)),
+                    add_product_single(sums[3], p, load(d)),
                 ];
             }
         }
-        for (to, sum) in row[at..].as_chunks_mut().0.iter_mut().zip(sums) {
-            store_single(to, sum);
-        }
+        store_all(&mut row[at..], sums);
         at += 16;
     }
     if at < stride {
         let mut sums = [f32x4_splat(0.0); 2];
         for (p, values) in factors.iter().zip(rows.chunks_exact(stride)) {
             if let Some(values) = values[at..].first_chunk::<8>() {
-                let [a, b]: &[[f32; 4]; 2] = cast_ref(values);
+                let [a, b]: &[[f32; 4]; 2] = must_cast_ref(values);
                 let p = f32x4_splat(*p);
                 sums = [
-                    add_product_single(sums[0], p, load_single(a)),
-                    add_product_single(sums[1], p, load_single(b)),
+                    add_product_single(sums[0], p, load(a)),
+                    add_product_single(sums[1], p, load(b)),
                 ];
             }
         }
-        for (to, sum) in row[at..].as_chunks_mut().0.iter_mut().zip(sums) {
-            store_single(to, sum);
-        }
+        store_all(&mut row[at..], sums);
     }
 }
 
@@ -283,8 +274,8 @@ pub(crate) fn combine_slots(
 ) -> [[f32; BLOCK_SLOTS]; 3] {
     let mut sums = [[f32x4_splat(0.0); 3]; 3];
     for (coefficient, kernel) in coefficients.iter().zip(kernels) {
-        let [a, b, c]: &[[f32; 4]; 3] = cast_ref(kernel);
-        let (a, b, c) = (load_single(a), load_single(b), load_single(c));
+        let [a, b, c]: &[[f32; 4]; 3] = must_cast_ref(kernel);
+        let (a, b, c) = (load(a), load(b), load(c));
         let add = |sum: [v128; 3], coefficient: f32| {
             let factor = f32x4_splat(coefficient);
             [
@@ -298,9 +289,7 @@ pub(crate) fn combine_slots(
     }
     sums.map(|sum| {
         let mut block = [0.0; BLOCK_SLOTS];
-        for (to, sum) in block.as_chunks_mut().0.iter_mut().zip(sum) {
-            store_single(to, sum);
-        }
+        store_all(&mut block, sum);
         block
     })
 }
