@@ -1,9 +1,10 @@
 //! Linear algebra on small dense matrices of `f64`, row-major, as slices.
 //!
 //! The matrices here have 3 to about 1000 rows, and one factorisation is over in microseconds: what a general library
-//! does before and after costs as much as the work itself. The inner loops are in `kernels`, and [`vectorise`] compiles a caller together with all that it inlines for the widest ones. No
-//! function fuses a multiplication with an addition or sums in an order that depends on the width of a register, so
-//! every machine, WebAssembly too, returns the same bits.
+//! does before and after costs as much as the work itself. The inner loops are in `kernels`. The compiler makes vector
+//! instructions of them, and [`vectorise`] compiles a caller together with all that it inlines for the widest ones; for
+//! WebAssembly they are written out. No function fuses a multiplication with an addition or sums in an order that depends
+//! on the width of a register, so every machine returns the same bits.
 
 mod cholesky;
 mod eigen;

@@ -1,4 +1,4 @@
-//! Sorting. All goes through one function: each other comparison would add two kilobytes to a WebAssembly module.
+//! Sorting. All lists of recovery go through one function: each other comparison would add two kilobytes to its module.
 
 /// The indices of the keys in ascending order. Equal keys keep their order.
 pub(crate) fn ascending_order(keys: impl IntoIterator<Item = f64>) -> Vec<usize> {

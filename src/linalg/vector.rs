@@ -50,6 +50,20 @@ mod tests {
     }
 
     #[test]
+    fn lengths_that_are_no_multiple_of_the_lanes_are_summed_whole() {
+        for n in [1, 3, 7, 12, 13, 24] {
+            let (a, b) = (vector(n, 1), vector(n, 2));
+            let products: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
+            assert!((products - dot(&a, &b)).abs() < 1e-9);
+            let mut sum = a.clone();
+            add_scaled(&mut sum, 0.5, &b);
+            let expected: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a + 0.5 * b).collect();
+            assert_eq!(sum, expected);
+        }
+        assert_eq!([0, 1, 8, 9].map(padded_len), [0, 8, 8, 16]);
+    }
+
+    #[test]
     fn add_scaled_rows_sums_rows() {
         let mut y = vec![1.0, 2.0];
         let matrix: Vec<f64> = (0..12).map(f64::from).collect();

@@ -59,11 +59,11 @@ pub(super) async fn mean_function(
         preparation.executor.check_cancelled()?;
         // A small picture needs all of its few squares.
         let is_early = round < ROUNDS && squares.len() == MAX_SQUARES;
-        let squares = if is_early { &sample } else { &squares };
-        let function = fit_round(preparation, squares, &mean).await?;
+        let used = if is_early { &sample } else { &squares };
+        let function = fit_round(preparation, used, &mean).await?;
         let sum: f64 = function.iter().sum();
         if sum.is_nan() || sum <= 0.0 {
-            return Err(dark_or_overexposed(preparation.measurements, squares));
+            return Err(dark_or_overexposed(preparation.measurements, &squares));
         }
         mean = function.iter().map(|m| m / sum).collect();
     }

@@ -20,7 +20,7 @@ use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::{Measurements, group_count};
 use crate::job_executor::{Executor, PARTS, set_values, values};
 use crate::linalg::{self, add_scaled, ascending_order, vectorise};
-use crate::transport::{Geometry, LightElement, TileRect, Window};
+use crate::transport::{CameraPixel, Geometry, LightElement, TileRect, Window};
 
 /// Side of the widest window that is searched.
 const MAX_SIDE: u32 = 31;
@@ -82,8 +82,9 @@ impl WindowSizeEstimate {
         let rings = WindowRings::new(max_side, group_count(&pattern_ids(&measurements.patterns)));
         let squares = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
         // Errors of neighbouring squares are correlated: each part is a strip of the picture.
-        let position =
-            |square: &TileRect| f64::from(square.y) * f64::from(1 << 24) + f64::from(square.x);
+        let position = |&TileRect { x, y, .. }: &TileRect| {
+            measurements.camera.index(CameraPixel { x, y }) as f64
+        };
         let order = ascending_order(squares.iter().map(position));
         let squares: Vec<TileRect> = order.into_iter().map(|i| squares[i]).collect();
         executor.check_cancelled()?;

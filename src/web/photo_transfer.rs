@@ -16,9 +16,9 @@ struct PackedTileHeader {
     lengths: [u32; 2],
 }
 
-/// The error for values that the other module cannot have sent.
+/// The error for values that another worker or module cannot have sent.
 pub fn corrupt() -> CodedError {
-    CodedError::internal("a photograph was corrupted on its way from its worker")
+    CodedError::internal("data was corrupted on its way from another worker or module")
 }
 
 /// Grids, window, tile side and correspondence, as `unpack_transport` reads them.

@@ -649,8 +649,8 @@ test('twenty recoveries leave no memory and no workers', async ({ openPage }) =>
   const after = await usage();
   note(`${JSON.stringify(before)} → ${JSON.stringify(after)}`);
   expect(after.workers).toBe(0);
-  expect(after.heap - before.heap, 'the heap of scripts').toBeLessThan(20 * 10_000);
-  expect(after.buffers - before.buffers, 'array buffers').toBeLessThan(20 * 10_000);
+  expect(after.heap - before.heap, 'the heap of scripts').toBeLessThan(10 * 10_000);
+  expect(after.buffers - before.buffers, 'array buffers').toBeLessThan(10 * 10_000);
 });
 
 test('a dropped zip is opened', async ({ openPage }) => {

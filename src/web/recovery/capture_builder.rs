@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::error::corrupt;
 use super::measurement_input::MeasurementInput;
 use crate::capture::{CameraRowSet, Measurements, NoiseModel};
 use crate::export::Provenance;
 use crate::web::CodedError;
+use crate::web::photo_transfer::corrupt;
 
 /// Takes the photographs of a capture folder one by one.
 #[wasm_bindgen]

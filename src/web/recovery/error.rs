@@ -6,11 +6,6 @@ use crate::transport::GeometryError;
 use crate::web::CodedError;
 use crate::web::recovery_error::with_remedy;
 
-/// The error for bytes that another worker or module cannot have sent.
-pub(super) fn corrupt() -> CodedError {
-    CodedError::internal("data was corrupted on its way from another worker or module")
-}
-
 impl From<RecoverError> for CodedError {
     fn from(error: RecoverError) -> Self {
         let (code, remedy) = match &error {

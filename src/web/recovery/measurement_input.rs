@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::error::corrupt;
 use crate::capture::Measurements;
 use crate::export::Provenance;
 use crate::web::CodedError;
+use crate::web::photo_transfer::corrupt;
 use crate::web::recovery_error::out_of_memory;
 
 /// The measurements of a recovery, and what its file says of their origin.

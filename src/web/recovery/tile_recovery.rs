@@ -2,11 +2,11 @@
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use super::error::corrupt;
 use super::recovery_job::encoded_tile;
 use crate::capture::{CameraRowSet, LinearPhoto, Measurements};
 use crate::recover::PreparedRecovery;
 use crate::web::CodedError;
+use crate::web::photo_transfer::corrupt;
 
 /// Recovers tiles of a strip of tile rows.
 #[wasm_bindgen]
