@@ -106,14 +106,6 @@ impl Measurements {
         self.noise.variance(c, y, exposure)
     }
 
-    /// Weight of each pattern's equations, mean square 1: the square root of its exposure, as the variance of photon
-    /// noise, the largest part, is inversely proportional to exposure.
-    pub fn pattern_weights(&self) -> Vec<f64> {
-        let exposures = self.full_scale.iter().map(|&full| f64::from(full).recip());
-        let mean = exposures.clone().sum::<f64>() / self.full_scale.len() as f64;
-        exposures.map(|exposure| (exposure / mean).sqrt()).collect()
-    }
-
     /// Number of pixels of a tile with fewer than `min_samples` unsaturated samples in some channel.
     pub fn count_overexposed_pixels(&self, rect: TileRect, min_samples: usize) -> usize {
         let is_overexposed = |pixel: &CameraPixel| {

@@ -48,8 +48,11 @@ pub fn definition() -> clap::Command {
     Cli::command()
 }
 
-/// Parses the command line and runs it. The exit status is 0 on success, 1 on failure, 2 for a wrong command line, 130
-/// after an interruption.
+/// Exit status for photographs that `--strict` does not accept: `EX_DATAERR` of sysexits.
+const DATA_ERROR_STATUS: u8 = 65;
+
+/// Parses the command line and runs it. The exit status is 0 on success, 1 on failure, 2 for a wrong command line, 65 for
+/// warnings with `--strict`, 130 after an interruption.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Simulate(args) => simulate::run(&args),
@@ -68,8 +71,11 @@ pub fn main() -> ExitCode {
         return ExitCode::from(process_resources::INTERRUPTED_STATUS);
     }
     eprintln!("error: {}", advice::error_with_remedy(&error));
-    match error.is::<value_parsers::UsageError>() {
-        true => ExitCode::from(2),
+    if error.is::<value_parsers::UsageError>() {
+        return ExitCode::from(2);
+    }
+    match error.is::<recover::StrictError>() {
+        true => ExitCode::from(DATA_ERROR_STATUS),
         false => ExitCode::FAILURE,
     }
 }

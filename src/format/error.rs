@@ -142,7 +142,7 @@ pub enum FormatError {
     TrailingBytes(u64),
     /// Writing: zstd fails.
     #[error("light transport does not compress: {0}")]
-    Compress(std::io::Error),
+    Compress(&'static str),
     /// Writing: the output fails.
     #[error("the file cannot be written: {0}")]
     Write(std::io::Error),

@@ -7,6 +7,7 @@
 //! on the width of a register, so every machine returns the same bits.
 
 mod cholesky;
+mod cosine;
 mod eigen;
 mod kernels;
 mod matrix;
@@ -15,6 +16,7 @@ mod vector;
 mod vectorise;
 
 pub(crate) use cholesky::{cholesky, cholesky_inverse, cholesky_solve, cholesky_with_ridge};
+pub(crate) use cosine::cos_pi;
 pub(crate) use eigen::{symmetric_eigen, symmetric_eigenvalues};
 pub(crate) use kernels::{
     BLOCK_SLOTS, LANES, add_outer_block, add_products, add_scaled, combine_blocks, combine_slots,

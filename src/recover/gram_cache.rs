@@ -7,8 +7,8 @@
 
 use super::common_mode_weight::CommonModeWeight;
 use super::normal_equations::{EquationWeights, WeightedColumns};
-use crate::capture::Measurements;
 use crate::linalg::{add_scaled, dot, vectorise};
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::transport::{ClippedRect, Extent, Geometry, LightElement, Window};
 
 /// Largest table of correlations that one thread may have in memory.
@@ -70,7 +70,7 @@ impl GramCache {
     /// A cache for the windows with these origins. The equations are those of the patterns `pattern_indices`, in the
     /// colour of `channel`.
     pub fn new(
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         geometry: Geometry,
         pattern_indices: &[usize],
         channel: usize,
@@ -248,6 +248,7 @@ fn subtract_outer_product(a: &mut [f64], factor: f64, v: &[f64]) {
 mod tests {
     use super::super::preparation_input;
     use super::*;
+    use crate::capture::Measurements;
     use crate::capture::{CameraRowSet, NoiseModel, Pattern};
     use crate::transport::{CHANNELS, Correspondence};
 
@@ -280,6 +281,7 @@ mod tests {
     #[test]
     fn table_agrees_with_products() {
         let (measurements, indices) = (measurements(), (0..PATTERNS).collect::<Vec<_>>());
+        let measurements = CalibratedMeasurements::uncorrected(&measurements);
         let window = Window::new(3).unwrap();
         let geometry = preparation_input::geometry(&measurements, window).unwrap();
         let cache = |origins: &[LightElement]| {

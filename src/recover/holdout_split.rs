@@ -12,7 +12,7 @@ const HELD_OUT_EVERY: usize = 10;
 /// A division of the patterns, by their indices in the measurements.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct HoldoutSplit {
-    /// All patterns.
+    /// All patterns that may be used.
     pub all: Vec<usize>,
     /// All but those held out.
     pub training: Vec<usize>,
@@ -24,11 +24,16 @@ impl HoldoutSplit {
     /// Holds out every tenth distinct pattern. Shots of one pattern at several exposures stay together: a pattern that
     /// is in both parts would measure memory, not prediction.
     pub fn new(patterns: &[Pattern]) -> Self {
-        let all: Vec<usize> = (0..patterns.len()).collect();
+        Self::without(patterns, |_| false)
+    }
+
+    /// The same without the patterns that are `left_out`.
+    pub fn without(patterns: &[Pattern], left_out: impl Fn(usize) -> bool) -> Self {
+        let all: Vec<usize> = (0..patterns.len()).filter(|&l| !left_out(l)).collect();
         let ids = pattern_ids(patterns);
-        let is_held_out = |l: &&usize| ids[**l] % HELD_OUT_EVERY == HELD_OUT_EVERY / 2;
+        let is_held_out = |l: &usize| ids[*l] % HELD_OUT_EVERY == HELD_OUT_EVERY / 2;
         let (mut held_out, mut training): (Vec<usize>, Vec<usize>) =
-            all.iter().partition(is_held_out);
+            all.iter().copied().partition(is_held_out);
         if training.len() < MIN_PATTERNS || held_out.is_empty() {
             (held_out, training) = (Vec::new(), all.clone());
         }

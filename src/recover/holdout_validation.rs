@@ -14,8 +14,9 @@ use super::error::RecoverError;
 use super::holdout_split::{HoldoutSplit, pattern_ids};
 use super::preparation_input::RecoveryPreparationInput;
 use super::{prediction, sampling};
-use crate::capture::{Measurements, Pattern, group_count};
+use crate::capture::{Pattern, group_count};
 use crate::job_executor::Executor;
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::transport::{
     Basis, CHANNELS, Decibels, FloatTile, Geometry, TileRect, TileTransportFunctions,
 };
@@ -189,7 +190,11 @@ fn residual_variance(
 
 /// Variances between patterns, summed over pixels and channels: of the measurements less their noise, and of the noise
 /// under the held-out patterns.
-fn variances(measurements: &Measurements, split: &HoldoutSplit, rect: TileRect) -> (f64, f64) {
+fn variances(
+    measurements: &CalibratedMeasurements<'_>,
+    split: &HoldoutSplit,
+    rect: TileRect,
+) -> (f64, f64) {
     let (mut signal, mut noise) = (0.0, 0.0);
     for pixel in rect.pixels() {
         for c in 0..CHANNELS {
@@ -238,7 +243,7 @@ mod tests {
     fn validate(capture: &SyntheticCapture, factor: f64) -> Option<HoldoutValidation> {
         let functions = capture.functions(factor);
         let preparation = RecoveryPreparationInput {
-            measurements: &capture.measurements,
+            measurements: &CalibratedMeasurements::uncorrected(&capture.measurements),
             geometry: capture.geometry,
             split: &HoldoutSplit::new(&capture.measurements.patterns),
             executor: &SequentialExecutor,

@@ -4,7 +4,6 @@
 //! Chosen are the weight ω of the common mode and, for denoising, the share of the noise that the tolerance ε allows.
 //! Each candidate recovers a sample of windows, spread over the picture.
 
-use std::collections::BTreeMap;
 use std::slice::from_ref;
 
 use super::bpdn::{ResidualTolerance, SparsityBasis};
@@ -15,8 +14,9 @@ use super::holdout_split::HoldoutSplit;
 use super::pixelwise::{PixelSamples, PixelsByWindow, PixelwiseMethod, PixelwiseRecovery};
 use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, MIN_PATTERNS};
-use crate::capture::Measurements;
 use crate::job_executor::{Cancelled, Executor};
+use crate::linalg::ascending_order;
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::transport::{Decibels, SnrAccumulator, TileRect};
 
 /// Largest number of windows in a sample, and of pixels in each: enough to tell candidates apart by hundredths of a
@@ -67,7 +67,7 @@ impl PixelwiseRecovery {
     /// Error of the predictions of one window's measurements under the held-out patterns.
     fn prediction_error(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         split: &HoldoutSplit,
         window: &PixelsByWindow,
     ) -> SnrAccumulator {
@@ -115,27 +115,40 @@ impl PixelwiseRecovery {
     }
 }
 
+/// More than the columns of a light plane, to order its elements row by row.
+const ROW_STRIDE: f64 = (1u64 << 32) as f64;
+
 /// Windows spread over the picture, with some of their pixels.
 fn sample_windows(
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
     [max_windows, max_pixels]: [usize; 2],
 ) -> Result<Vec<PixelsByWindow>, RecoverError> {
     let geometry = &preparation.geometry;
-    let mut windows = BTreeMap::new();
+    let mut windows: Vec<PixelsByWindow> = Vec::new();
     let is_covered = |&tile: &TileRect| preparation.measurements.has_tile(tile);
     for tile in geometry.tiles().filter(is_covered) {
         for (origin, mut pixels) in sampling::pixels_by_window(geometry, tile) {
             if !geometry.clip_window(origin).is_empty() {
                 pixels.truncate(max_pixels);
-                windows.insert(origin, pixels);
+                windows.push((origin, pixels));
             }
         }
     }
     if windows.is_empty() {
         return Err(RecoverError::CorrespondenceOffLightPlane);
     }
-    let step = windows.len().div_ceil(max_windows);
-    Ok(windows.into_iter().step_by(step).collect())
+    // Windows across the border of tiles are in the list of each.
+    let position =
+        |(origin, _): &PixelsByWindow| f64::from(origin.v) * ROW_STRIDE + f64::from(origin.u);
+    let order = ascending_order(windows.iter().map(position));
+    let is_last = |i: &usize| {
+        let next = order.get(i + 1).map(|&next| windows[next].0);
+        next != Some(windows[order[*i]].0)
+    };
+    let order: Vec<usize> = (0..order.len()).filter(is_last).map(|i| order[i]).collect();
+    let step = order.len().div_ceil(max_windows);
+    let chosen = order.into_iter().step_by(step);
+    Ok(chosen.map(|i| windows[i].clone()).collect())
 }
 
 /// The candidate that predicts the held-out patterns of the sample best; the first if no pattern is held out.

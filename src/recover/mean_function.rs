@@ -11,12 +11,12 @@ use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::nnls::Nnls;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
-use super::pattern_check;
+use super::photometry::CalibratedMeasurements;
 use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::Measurements;
 use crate::job_executor::{Cancelled, Executor, PARTS};
-use crate::linalg::{add_scaled, vectorise};
+use crate::linalg::{self, add_scaled, vectorise};
 use crate::transport::{CHANNELS, LightElement, TileRect, Window};
 
 /// Rounds of brightness and function. A brightness that is a few per cent off, as it is while the function is unknown,
@@ -34,6 +34,9 @@ const SQUARE_SIDE: u32 = 4;
 /// Upper bound on the pixels and channels in these squares.
 pub(super) const MAX_SAMPLES: usize = MAX_SQUARES * (SQUARE_SIDE * SQUARE_SIDE) as usize * CHANNELS;
 
+/// Standard deviation, in elements, of the Gaussian that smooths the noisy mean function.
+const SMOOTHING_SIGMA: f64 = 1.0;
+
 /// Upper bound on the memory that [`mean_function`] takes, in bytes.
 pub(super) fn max_bytes(window: Window) -> usize {
     (2 * PARTS + 2) * window.area() * window.area() * size_of::<f64>()
@@ -43,11 +46,10 @@ pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
     sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES)
 }
 
-/// Returns the mean light transport function, `[slot]`, non-negative and of sum 1, after a check that the photographs
-/// show their patterns.
+/// Returns the mean light transport function, `[slot]`, non-negative and of sum 1.
 ///
 /// # Errors
-/// If the photographs are dark or overexposed, if they do not match their patterns, and if the executor is cancelled.
+/// If the photographs are dark or overexposed, and if the executor is cancelled.
 pub(super) async fn mean_function(
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
 ) -> Result<Vec<f64>, RecoverError> {
@@ -67,9 +69,24 @@ pub(super) async fn mean_function(
         }
         mean = function.iter().map(|m| m / sum).collect();
     }
-    preparation.executor.check_cancelled()?;
-    pattern_check::check_patterns(preparation, &mean, &squares).await?;
     Ok(mean)
+}
+
+/// Smooths a function on the window, `[side²]`, by a Gaussian and scales it to sum 1.
+pub(super) fn smooth(function: &[f64], side: usize) -> Vec<f64> {
+    let radius = (3.0 * SMOOTHING_SIGMA).ceil() as i64;
+    let tap = |d: i64| libm::exp(-0.5 * (d as f64 / SMOOTHING_SIGMA).powi(2));
+    let norm: f64 = (-radius..=radius).map(tap).sum();
+    // Along one axis, `[side, side]`.
+    let blur = (0..side * side).map(|i| match (i / side).abs_diff(i % side) as i64 {
+        distance if distance <= radius => tap(distance) / norm,
+        _ => 0.0,
+    });
+    let blur: Vec<f64> = blur.collect();
+    let rows = linalg::multiply(function, &blur, side, side);
+    let smoothed = linalg::multiply(&blur, &rows, side, side);
+    let sum: f64 = smoothed.iter().sum();
+    smoothed.iter().map(|m| m / sum).collect()
 }
 
 /// Estimates every pixel's brightness with the function `mean`, then the function of all pixels, `[slot]`.
@@ -154,7 +171,7 @@ impl PooledMeasurements {
     /// pixel of brightness 1 measures.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn new(
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         pattern_indices: &[usize],
         pixels: &PixelsSharingWindow,
         channels: Range<usize>,
@@ -185,7 +202,10 @@ impl PooledMeasurements {
     }
 }
 
-fn dark_or_overexposed(measurements: &Measurements, squares: &[TileRect]) -> RecoverError {
+fn dark_or_overexposed(
+    measurements: &CalibratedMeasurements<'_>,
+    squares: &[TileRect],
+) -> RecoverError {
     let patterns = measurements.patterns.len();
     let saturated = |&square| measurements.count_overexposed_pixels(square, patterns);
     let saturated: usize = squares.iter().map(saturated).sum();
@@ -205,7 +225,7 @@ mod tests {
 
     fn fit(capture: &SyntheticCapture) -> Result<Vec<f64>, RecoverError> {
         pollster::block_on(mean_function(&RecoveryPreparationInput {
-            measurements: &capture.measurements,
+            measurements: &CalibratedMeasurements::uncorrected(&capture.measurements),
             geometry: capture.geometry,
             split: &HoldoutSplit::new(&capture.measurements.patterns),
             executor: &SequentialExecutor,
@@ -226,13 +246,12 @@ mod tests {
     fn certainty_is_the_inverse_variance_of_pixels_scaled_to_brightness_one() {
         let mut capture = SyntheticCapture::new(8);
         capture.measurements.noise.floor = [4e-4; CHANNELS];
-        let pixels: Vec<_> =
-            sampling::pixels_by_window(&capture.geometry, capture.functions(1.0).rect)
-                .remove(&LightElement { u: 3, v: 3 })
-                .unwrap();
+        let windows = sampling::pixels_by_window(&capture.geometry, capture.functions(1.0).rect);
+        let origin = LightElement { u: 3, v: 3 };
+        let (_, pixels) = windows.iter().find(|window| window.0 == origin).unwrap();
         let (all, level) = ((0..8).collect::<Vec<_>>(), 0.5);
-        let pooled =
-            PooledMeasurements::new(&capture.measurements, &all, &pixels[..1], 1..2, level);
+        let measurements = CalibratedMeasurements::uncorrected(&capture.measurements);
+        let pooled = PooledMeasurements::new(&measurements, &all, &pixels[..1], 1..2, level);
         let y: Vec<f64> = all
             .iter()
             .map(|&l| capture.measurements.sample(l, pixels[0].1, 1))
@@ -246,14 +265,8 @@ mod tests {
     }
 
     #[test]
-    fn dark_saturated_and_swapped_photographs_are_refused() {
+    fn dark_and_saturated_photographs_are_refused() {
         let mut capture = SyntheticCapture::new(60);
-        capture.measurements.photos.swap(3, 8);
-        let error = fit(&capture).unwrap_err();
-        let RecoverError::MismatchedPatterns { pattern_indices } = error else {
-            panic!("{error}");
-        };
-        assert_eq!(pattern_indices, [3, 8]);
         capture
             .measurements
             .photos

@@ -201,9 +201,21 @@ impl<'a> Nnls<'a> {
         }
         let mut largest =
             std::array::from_fn(|lane| (best_index[lane] as usize * LANES + lane, best[lane]));
-        largest.sort_unstable_by(|a: &(usize, f64), b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        // Few enough for insertion; of equal ones the first element comes first.
+        for end in 1..LANES {
+            let mut at = end;
+            while at > 0 && comes_before(largest[at], largest[at - 1]) {
+                largest.swap(at, at - 1);
+                at -= 1;
+            }
+        }
         largest
     }
+}
+
+/// Whether an element and its gradient come before another: by descending gradient.
+fn comes_before(a: (usize, f64), b: (usize, f64)) -> bool {
+    a.1 > b.1 || a.1 == b.1 && a.0 < b.0
 }
 
 #[cfg(all(test, not(target_arch = "wasm32")))] // where there is proptest

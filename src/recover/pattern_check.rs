@@ -9,11 +9,12 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::error::RecoverError;
+use super::mean_function;
 use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, PixelsSharingWindow};
 use crate::job_executor::Executor;
 use crate::linalg;
-use crate::transport::{LightElement, TileRect};
+use crate::transport::LightElement;
 
 /// Smallest slope of a photograph that matches its pattern, relative to [`REFERENCE_PERCENTILE`].
 const MIN_SLOPE_RATIO: f64 = 0.4;
@@ -27,7 +28,7 @@ const CORRELATION_ERRORS: f64 = 2.0;
 const MIN_SQUARES: usize = 32;
 const MIN_HELD_OUT: usize = 2;
 
-/// Checks the photographs on `squares` of the picture; `mean_function` is `[slot]`.
+/// Checks the photographs on squares of the picture; `mean_function` is `[slot]`.
 ///
 /// # Errors
 /// [`RecoverError::MismatchedPatterns`] if some photographs do not match their patterns, and
@@ -36,14 +37,14 @@ const MIN_HELD_OUT: usize = 2;
 pub(super) async fn check_patterns(
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
     mean_function: &[f64],
-    squares: &[TileRect],
 ) -> Result<(), RecoverError> {
+    let squares = mean_function::sample_squares(preparation.measurements);
     if squares.len() < MIN_SQUARES {
         return Ok(());
     }
-    let split = preparation.split;
+    let (split, patterns) = (preparation.split, preparation.measurements.patterns.len());
     let square_moments = |i: usize| {
-        let mut moments = vec![SlopeMoments::default(); split.all.len()];
+        let mut moments = vec![SlopeMoments::default(); patterns];
         for (origin, pixels) in sampling::pixels_by_window(&preparation.geometry, squares[i]) {
             add_window(&mut moments, preparation, mean_function, origin, &pixels);
         }
@@ -57,8 +58,13 @@ pub(super) async fn check_patterns(
     linalg::sort(&mut values);
     let reference = values.get(values.len() * REFERENCE_PERCENTILE / 100);
     let min_slope = MIN_SLOPE_RATIO * reference.copied().unwrap_or(0.0);
-    let is_mismatched = |&l: &usize| slopes[l].is_some_and(|slope| slope.is_below(min_slope));
-    let mismatched: Vec<usize> = (0..split.all.len()).filter(is_mismatched).collect();
+    let is_mismatched =
+        |slope: &Option<SlopeEstimate>| slope.is_some_and(|slope| slope.is_below(min_slope));
+    let slopes = split.all.iter().zip(&slopes);
+    let mismatched = slopes
+        .filter(|(_, slope)| is_mismatched(slope))
+        .map(|(l, _)| *l);
+    let mismatched: Vec<usize> = mismatched.collect();
     let held_out = split.held_out.iter().copied();
     let held_out: Vec<usize> = held_out.filter(|l| !mismatched.contains(l)).collect();
     let is_uncorrelated = split.held_out.len() >= MIN_HELD_OUT
@@ -129,12 +135,12 @@ fn add_window(
     let (measurements, split) = (preparation.measurements, preparation.split);
     let elements: Vec<_> = preparation.geometry.elements_of_window(origin).collect();
     for (plane, channels) in measurements.planes() {
-        let predict = |&l: &usize| {
+        let predict = |l: usize| {
             let pattern = measurements.patterns[l].plane(plane);
             let term = |&(slot, m): &(usize, usize)| mean_function[slot] * f64::from(pattern[m]);
             elements.iter().map(term).sum::<f64>()
         };
-        let predictions: Vec<f64> = split.all.iter().map(predict).collect();
+        let predictions: Vec<f64> = (0..measurements.patterns.len()).map(predict).collect();
         let pixels = pixels.iter();
         for (pixel, c) in pixels.flat_map(|p| channels.clone().map(move |c| (p.1, c))) {
             let sample = |l: usize| measurements.sample(l, pixel, c);
@@ -147,8 +153,8 @@ fn add_window(
             if !(predicted > 0.0 && measured > 0.0) {
                 continue;
             }
-            for (l, moments) in moments.iter_mut().enumerate() {
-                let deviation = sample(l) - measured / count;
+            for &l in &split.all {
+                let (moments, deviation) = (&mut moments[l], sample(l) - measured / count);
                 if deviation.is_finite() {
                     let prediction = measured / predicted * (predictions[l] - predicted / count);
                     moments.prediction += prediction * prediction;

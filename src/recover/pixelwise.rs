@@ -5,8 +5,6 @@
 //! window. All pixels and channels of a window that the same patterns do not saturate share their equations
 //! ([`super::gram_cache`]).
 
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
 
 use super::bpdn::{
@@ -15,8 +13,8 @@ use super::bpdn::{
 use super::common_mode_weight::CommonModeWeight;
 use super::gram_cache::{GramCache, WindowEquations};
 use super::nnls::Nnls;
-use super::sampling;
-use crate::capture::Measurements;
+use super::sampling::{self, Group};
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::transport::{
     CameraPixel, Geometry, LightElement, TileRect, TileTransportFunctions, Window,
 };
@@ -45,7 +43,7 @@ pub(super) struct PixelwiseRecovery {
 }
 
 /// Pixels that share a window, by its origin.
-pub(super) type PixelsByWindow = (LightElement, Vec<(usize, CameraPixel)>);
+pub(super) type PixelsByWindow = Group<LightElement, (usize, CameraPixel)>;
 
 /// The measurements of a pixel and channel, one for each pattern of its equations.
 pub(super) struct PixelSamples {
@@ -74,18 +72,18 @@ impl PixelwiseRecovery {
     /// Recovers a tile from the patterns `pattern_indices`.
     pub fn tile(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> TileTransportFunctions {
         let area = self.geometry.window.area();
         let mut functions = TileTransportFunctions::zeros(rect, area);
-        let mut squares: BTreeMap<_, Vec<PixelsByWindow>> = BTreeMap::new();
+        let mut squares: Vec<Group<_, PixelsByWindow>> = Vec::new();
         for (origin, pixels) in sampling::pixels_by_window(&self.geometry, rect) {
             let square = [origin.v, origin.u].map(|at| at.div_euclid(CACHE_SIDE));
-            squares.entry(square).or_default().push((origin, pixels));
+            sampling::add_to_group(&mut squares, square, (origin, pixels));
         }
-        for windows in squares.values() {
+        for (_, windows) in &squares {
             let mut store = |equations: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
                 for (&slot, &x) in equations.slots.iter().zip(x) {
                     functions.tau[samples.index * area + slot][samples.channel] = x as f32;
@@ -99,7 +97,7 @@ impl PixelwiseRecovery {
     /// Solves for the pixels of neighbouring windows from the patterns `pattern_indices`.
     pub fn solve_windows(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         windows: &[PixelsByWindow],
         pattern_indices: &[usize],
         on_solution: &mut SolutionCallback<'_>,
@@ -110,18 +108,18 @@ impl PixelwiseRecovery {
             let geometry = self.geometry;
             let cache = GramCache::new(measurements, geometry, pattern_indices, plane, &origins);
             for (origin, pixels) in windows {
-                let mut samples_by_patterns: BTreeMap<_, Vec<_>> = BTreeMap::new();
+                let mut samples_by_patterns = Vec::new();
                 for &(index, pixel) in pixels {
                     for channel in channels.clone() {
                         let (usable, y) =
                             sampling::usable_samples(measurements, pattern_indices, pixel, channel);
-                        let samples = samples_by_patterns.entry(usable).or_default();
-                        samples.push(PixelSamples {
+                        let samples = PixelSamples {
                             index,
                             pixel,
                             channel,
                             y,
-                        });
+                        };
+                        sampling::add_to_group(&mut samples_by_patterns, usable, samples);
                     }
                 }
                 for (usable, samples) in &samples_by_patterns {

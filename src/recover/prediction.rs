@@ -1,6 +1,7 @@
 //! What light transport functions predict of measurements: `y = pT`, restricted to each pixel's window.
 
-use crate::capture::{Measurements, Pattern};
+use crate::capture::Pattern;
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::transport::{CHANNELS, Geometry, TileRect, TileTransportFunctions};
 
 /// The measurements that the functions of a region predict for `patterns`, `[pixel, pattern, channel]`.
@@ -31,7 +32,7 @@ pub(super) fn predictions<'a>(
 
 /// The measurements of a region under the patterns `pattern_indices`, `[pixel, pattern, channel]`; NaN where saturated.
 pub(super) fn samples(
-    measurements: &Measurements,
+    measurements: &CalibratedMeasurements<'_>,
     pattern_indices: &[usize],
     rect: TileRect,
 ) -> Vec<f64> {
@@ -48,7 +49,7 @@ pub(super) fn samples(
 /// measurement is saturated.
 pub(super) fn residuals(
     geometry: &Geometry,
-    measurements: &Measurements,
+    measurements: &CalibratedMeasurements<'_>,
     pattern_indices: &[usize],
     functions: &TileTransportFunctions,
 ) -> Vec<f64> {

@@ -2,15 +2,32 @@
 
 use super::error::RecoverError;
 use super::holdout_split::HoldoutSplit;
+use super::photometry::CalibratedMeasurements;
 use crate::capture::Measurements;
 use crate::transport::{Geometry, TileRect, Window};
 
 /// What a recovery is prepared from, and the executor that runs the preparation.
 pub(super) struct RecoveryPreparationInput<'a, E> {
-    pub measurements: &'a Measurements,
+    pub measurements: &'a CalibratedMeasurements<'a>,
     pub geometry: Geometry,
     pub split: &'a HoldoutSplit,
     pub executor: &'a E,
+}
+
+impl<'a, E> RecoveryPreparationInput<'a, E> {
+    /// The same with other corrections of the photographs.
+    pub fn with<'b>(
+        &self,
+        measurements: &'b CalibratedMeasurements<'b>,
+    ) -> RecoveryPreparationInput<'b, E>
+    where
+        'a: 'b,
+    {
+        RecoveryPreparationInput {
+            measurements,
+            ..*self
+        }
+    }
 }
 
 /// The geometry of a recovery with this window.

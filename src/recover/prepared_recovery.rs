@@ -9,6 +9,8 @@ use super::holdout_validation::HoldoutValidation;
 use super::learned::LearnedRecovery;
 use super::mean_function;
 use super::method::Method;
+use super::pattern_check;
+use super::photometry::{self, CalibratedMeasurements, LinearCorrection, PhotographFault};
 use super::pixelwise::PixelwiseRecovery;
 use super::preparation_input::{self, RecoveryPreparationInput};
 use super::sampling::MIN_PATTERNS;
@@ -32,7 +34,11 @@ pub struct RecoverySettings {
 pub struct PreparedRecovery {
     geometry: Geometry,
     split: HoldoutSplit,
+    corrections: Vec<LinearCorrection>,
     solver: TileSolver,
+    /// The photographs that are left out. Not needed to recover tiles elsewhere.
+    #[serde(skip)]
+    faults: Vec<(usize, PhotographFault)>,
     /// Not needed to recover tiles elsewhere.
     #[serde(skip)]
     holdout_validation: Option<HoldoutValidation>,
@@ -63,13 +69,25 @@ impl PreparedRecovery {
         }
         let split = HoldoutSplit::new(&measurements.patterns);
         let preparation = RecoveryPreparationInput {
-            measurements,
+            measurements: &CalibratedMeasurements::uncorrected(measurements),
             geometry,
             split: &split,
             executor,
         };
-        // Also checks that the photographs match their patterns, for every method.
-        let mean = mean_function::mean_function(&preparation).await?;
+        let mut mean = mean_function::mean_function(&preparation).await?;
+        let photometry = photometry::estimate(&preparation, &mean).await?;
+        let corrections = photometry.corrections.clone();
+        let is_left_out = |l: usize| photometry.faults.iter().any(|fault| fault.0 == l);
+        let split = HoldoutSplit::without(&measurements.patterns, is_left_out);
+        let preparation = RecoveryPreparationInput {
+            measurements: &CalibratedMeasurements::new(measurements, &corrections),
+            split: &split,
+            ..preparation
+        };
+        if photometry.has_changes() {
+            mean = mean_function::mean_function(&preparation).await?;
+        }
+        pattern_check::check_patterns(&preparation, &mean).await?;
         let solver = match settings.method {
             Method::Learned => {
                 TileSolver::Learned(Box::new(LearnedRecovery::new(&preparation, &mean).await?))
@@ -84,9 +102,12 @@ impl PreparedRecovery {
         let mut recovery = Self {
             geometry,
             split: split.clone(),
+            corrections: photometry.corrections,
             solver,
+            faults: photometry.faults,
             holdout_validation: None,
         };
+        let measurements = preparation.measurements;
         let training_tile = |rect: TileRect| match &recovery.solver {
             TileSolver::Learned(learned) => learned.training_tile(measurements, &split, rect),
             TileSolver::Pixelwise(solver) => {
@@ -119,6 +140,16 @@ impl PreparedRecovery {
         }
     }
 
+    /// Corrections of the photographs, one for each; none at all if no photograph needs one.
+    pub fn corrections(&self) -> &[LinearCorrection] {
+        &self.corrections
+    }
+
+    /// The photographs that are left out, by their indices in the measurements, with the fault that each looks like.
+    pub fn faults(&self) -> &[(usize, PhotographFault)] {
+        &self.faults
+    }
+
     /// The validation on held-out patterns; `None` if there are too few patterns to hold any out.
     pub fn holdout_validation(&self) -> Option<&HoldoutValidation> {
         self.holdout_validation.as_ref()
@@ -135,6 +166,7 @@ impl PreparedRecovery {
     /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other rows of the same
     /// capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> FloatTile {
+        let measurements = &CalibratedMeasurements::new(measurements, &self.corrections);
         match &self.solver {
             TileSolver::Learned(learned) => learned.tile(measurements, &self.split, rect),
             TileSolver::Pixelwise(solver) => {

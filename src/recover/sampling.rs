@@ -1,8 +1,8 @@
 //! Selects the pixels, patterns and light elements that an estimate uses.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::photometry::CalibratedMeasurements;
 use crate::capture::Measurements;
 use crate::transport::{CameraPixel, Extent, Geometry, LightElement, TileRect};
 
@@ -62,15 +62,26 @@ fn spread_over(
     squares
 }
 
+/// Values with the key that they share.
+pub(super) type Group<K, V> = (K, Vec<V>);
+
+/// Adds `value` to the group of its key. Groups are in ascending order of keys; new keys are expected near the end.
+pub(super) fn add_to_group<K: Ord, V>(groups: &mut Vec<Group<K, V>>, key: K, value: V) {
+    match groups.binary_search_by(|group| group.0.cmp(&key)) {
+        Ok(i) => groups[i].1.push(value),
+        Err(i) => groups.insert(i, (key, vec![value])),
+    }
+}
+
 /// The pixels of a region, grouped by the origin of their window.
 pub(super) fn pixels_by_window(
     geometry: &Geometry,
     rect: TileRect,
-) -> BTreeMap<LightElement, Vec<(usize, CameraPixel)>> {
-    let mut windows: BTreeMap<_, Vec<_>> = BTreeMap::new();
+) -> Vec<Group<LightElement, (usize, CameraPixel)>> {
+    let mut windows = Vec::new();
     for (p, pixel) in rect.pixels().enumerate() {
         let origin = geometry.window_origin(pixel);
-        windows.entry(origin).or_default().push((p, pixel));
+        add_to_group(&mut windows, origin, (p, pixel));
     }
     windows
 }
@@ -78,7 +89,7 @@ pub(super) fn pixels_by_window(
 /// The patterns of `pattern_indices` under which none of the pixels and channels is saturated; all of them if those are
 /// fewer than [`MIN_PATTERNS`].
 pub(super) fn unsaturated(
-    measurements: &Measurements,
+    measurements: &CalibratedMeasurements<'_>,
     pattern_indices: &[usize],
     pixels: &PixelsSharingWindow,
     channels: Range<usize>,
@@ -98,7 +109,7 @@ pub(super) fn unsaturated(
 /// The patterns that do not saturate a pixel's channel, and its measurements under them. If these patterns are fewer than
 /// [`MIN_PATTERNS`], all patterns; saturated measurements are then white, the least that they can be.
 pub(super) fn usable_samples(
-    measurements: &Measurements,
+    measurements: &CalibratedMeasurements<'_>,
     pattern_indices: &[usize],
     pixel: CameraPixel,
     c: usize,
@@ -106,7 +117,7 @@ pub(super) fn usable_samples(
     let usable = unsaturated(measurements, pattern_indices, &[(0, pixel)], c..c + 1);
     let sample = |&l: &usize| match measurements.sample(l, pixel, c) {
         y if y.is_finite() => y,
-        _ => f64::from(measurements.full_scale[l]),
+        _ => measurements.white(l),
     };
     let y = usable.iter().map(sample).collect();
     (usable, y)

@@ -80,16 +80,24 @@ const WINDOW: Window = match Window::new(5) {
     Err(_) => panic!("5 is odd"),
 };
 
-/// Noiseless measurements of pixels that all have one light transport function, times a brightness of their own.
+/// Noiseless measurements of pixels that all have one light transport function, or nearly, times a brightness of their
+/// own.
 pub(super) struct SyntheticCapture {
     pub geometry: Geometry,
     /// The function, of sum 1, `[slot]`.
     pub function: Vec<f64>,
     pub measurements: Measurements,
+    /// Standard deviation of every element of a pixel's function, relative to the element of `function`.
+    variation: f64,
 }
 
 impl SyntheticCapture {
     pub fn new(patterns: usize) -> Self {
+        Self::with_variation(patterns, 0.0)
+    }
+
+    /// The same with functions that vary from pixel to pixel.
+    pub fn with_variation(patterns: usize, variation: f64) -> Self {
         let square = |side| Extent::new(side, side);
         let geometry = Geometry {
             camera: square(32),
@@ -110,6 +118,7 @@ impl SyntheticCapture {
         let patterns: Vec<Pattern> = patterns.map(Pattern::Grey).collect();
         let mut capture = Self {
             geometry,
+            variation,
             function: weights.iter().map(|w| w / sum).collect(),
             measurements: Measurements {
                 camera: geometry.camera,
@@ -143,10 +152,13 @@ impl SyntheticCapture {
         let extent = self.geometry.camera;
         let mut functions =
             TileTransportFunctions::zeros(TileRect { x: 0, y: 0, extent }, self.function.len());
+        let mut next = uniform(13);
         for (i, tau) in functions.tau.iter_mut().enumerate() {
             let (n, slot) = (i / self.function.len(), i % self.function.len());
             let brightness = 0.1 + 0.02 * (n * 37 % 29) as f64;
-            *tau = [1.0, 0.8, 0.5].map(|c| (factor * c * brightness * self.function[slot]) as f32);
+            let variation = 1.0 + self.variation * 12f64.sqrt() * next();
+            let value = factor * brightness * variation * self.function[slot];
+            *tau = [1.0, 0.8, 0.5].map(|c| (c * value) as f32);
         }
         functions
     }

@@ -15,6 +15,7 @@ use super::error::RecoverError;
 use super::holdout_split::pattern_ids;
 use super::mean_function::PooledMeasurements;
 use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns};
+use super::photometry::CalibratedMeasurements;
 use super::preparation_input;
 use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::{Measurements, group_count};
@@ -88,6 +89,7 @@ impl WindowSizeEstimate {
         let order = ascending_order(squares.iter().map(position));
         let squares: Vec<TileRect> = order.into_iter().map(|i| squares[i]).collect();
         executor.check_cancelled()?;
+        let uncorrected = CalibratedMeasurements::uncorrected(measurements);
         // A part of the picture for each job, and for the jackknife.
         let sum_part = |part: usize| {
             let mut sums = NormalEquations::zeros(rings.count());
@@ -96,7 +98,7 @@ impl WindowSizeEstimate {
                 for (origin, pixels) in sampling::pixels_by_window(&geometry, *square) {
                     vectorise(
                         #[cfg_attr(target_arch = "x86_64", inline(always))]
-                        || rings.add_window(&mut sums, measurements, &geometry, origin, &pixels),
+                        || rings.add_window(&mut sums, &uncorrected, &geometry, origin, &pixels),
                     );
                 }
             }
@@ -168,7 +170,7 @@ impl WindowRings {
     fn add_window(
         &self,
         sums: &mut NormalEquations,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         geometry: &Geometry,
         origin: LightElement,
         pixels: &PixelsSharingWindow,

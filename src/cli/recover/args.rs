@@ -51,6 +51,12 @@ pub struct RecoverArgs {
     /// Continue an interrupted recovery from FILE.ltm.checkpoint
     #[arg(long)]
     pub resume: bool,
+    /// Fail with exit status 65, and write nothing, if there is a warning
+    #[arg(long)]
+    pub strict: bool,
+    /// Write the file even if the photographs do not follow from their patterns
+    #[arg(long)]
+    pub force: bool,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,

@@ -4,14 +4,14 @@ use std::io::ErrorKind;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use anyhow::{Context, Error, Result};
+use anyhow::{Context, Error, Result, bail};
 use rayon::prelude::*;
 
 use super::args::RecoverArgs;
 use super::checkpoint::{Checkpoint, compress_tile, lock};
 use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
-use super::messages;
-use super::report::RecoverReport;
+use super::messages::{self, StrictError, UnusableError, Warning};
+use super::report::{RecoverReport, photograph_reports};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements};
 use crate::cli::measurement_reader::{MeasurementReader, read_patterns};
 use crate::cli::output_file::{LTM, OutputFile};
@@ -21,7 +21,33 @@ use crate::export::{self, MemoryPlan, PreparedExport, Provenance};
 use crate::format::{EncodedFile, FormatError, Metadata};
 use crate::job_executor::{Cancelled, Executor};
 use crate::recover::{MIN_PATTERNS, PreparedRecovery, RecoverError, TailEstimate};
-use crate::transport::Basis;
+use crate::transport::{Basis, Decibels};
+
+/// SNR on held-out patterns below which hardly anything in a file would be right.
+const MIN_USABLE_SNR: Decibels = Decibels(1.0);
+
+/// The warnings printed so far.
+#[derive(Default)]
+struct Warnings {
+    given: Vec<Warning>,
+}
+
+impl Warnings {
+    fn add(&mut self, warnings: impl IntoIterator<Item = Warning>) {
+        for warning in warnings {
+            eprintln!("warning: {}", warning.message);
+            self.given.push(warning);
+        }
+    }
+
+    /// Fails after a warning if `strict` is set.
+    fn check(&self, strict: bool) -> Result<()> {
+        match strict && !self.given.is_empty() {
+            true => Err(StrictError.into()),
+            false => Ok(()),
+        }
+    }
+}
 
 pub struct RecoverJob<'a> {
     pub start: Instant,
@@ -65,9 +91,17 @@ impl RecoverJob<'_> {
         saturated: usize,
         checkpoint: &Mutex<Checkpoint>,
     ) -> Result<RecoverReport> {
-        messages::warn_of_saturation(saturated, &measurements);
+        let mut warnings = Warnings::default();
+        warnings.add(messages::saturation(saturated, &measurements));
         let prepared = self.prepare(&measurements)?;
         let recovery = &prepared.recovery;
+        warnings.add(messages::preparation(&prepared));
+        warnings.add(messages::photographs(self.folder, self.shots, recovery));
+        warnings.check(self.args.strict)?;
+        match prepared.expected_snr() {
+            Some(snr) if snr < MIN_USABLE_SNR && !self.args.force => bail!(UnusableError(snr)),
+            _ => {}
+        }
         let (method, window) = (self.args.method(), recovery.geometry().window);
         let rank = recovery.basis().map(Basis::rank);
         let encoders = self.plan.tiles_encoded_at_once(window, rank.unwrap_or(0));
@@ -76,6 +110,8 @@ impl RecoverJob<'_> {
         let noise = measurements.noise;
         let overexposed =
             self.recover_tiles(measurements, dark, recovery, checkpoint, saturated > 0)?;
+        warnings.add(messages::overexposure(overexposed));
+        warnings.check(self.args.strict)?;
         let provenance = Provenance::new(self.folder.manifest(), self.shots);
         let metadata = export::metadata(&provenance, method);
         let patterns = metadata.capture.patterns;
@@ -104,6 +140,8 @@ impl RecoverJob<'_> {
             saturated_samples: saturated,
             overexposed_pixels: overexposed,
             file_bytes,
+            photograph_reports: photograph_reports(self.folder, self.shots, recovery),
+            warnings: warnings.given,
         })
     }
 
@@ -115,7 +153,6 @@ impl RecoverJob<'_> {
         let prepared = pollster::block_on(preparation);
         drop(spinner);
         let prepared = prepared.map_err(|error| self.recover_error(error))?;
-        messages::warn_of_preparation(&prepared);
         Ok(prepared)
     }
 
@@ -165,12 +202,6 @@ impl RecoverJob<'_> {
             overexposed += counts.try_reduce(|| 0, |a, b| Ok(a + b))?;
         }
         drop(bar);
-        if overexposed > 0 {
-            eprintln!(
-                "warning: {overexposed} pixels are saturated in nearly all photographs and will be white \
-                 under any light; photograph with less exposure"
-            );
-        }
         Ok(overexposed)
     }
 

@@ -1,6 +1,7 @@
 //! Errors, warnings and notes of a recovery, in terms of the command line.
 
 use anyhow::{Error, anyhow};
+use serde::Serialize;
 
 use crate::capture::{CaptureFolder, Measurements};
 use crate::cli::value_parsers::ByteCount;
@@ -8,10 +9,37 @@ use crate::export::{
     MIN_PLAUSIBLE_SNR, PreparedExport, TooFewShots, TooLittleMemory, has_implausible_saturation,
     saturated_percent,
 };
-use crate::recover::TailEstimate;
+use crate::recover::{LinearCorrection, PhotographFault, PreparedRecovery, TailEstimate};
+use crate::transport::Decibels;
 
+/// Least standard deviation of exposures, and least stray light, that is worth a note.
+const MIN_NOTED_DEVIATION: f64 = 1e-3;
+/// Least deviation of a single exposure from the others that is named.
+const MIN_NAMED_DEVIATION: f64 = 0.1;
 /// Maximum number of shots or fields that a message names.
 const MAX_NAMED_ITEMS: usize = 4;
+
+/// A doubt about the photographs or the result, in `recover --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Warning {
+    /// Names the kind of doubt.
+    pub code: &'static str,
+    /// What is doubtful, and what helps.
+    pub message: String,
+}
+
+/// Warnings fail the command, by `--strict`.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("nothing is written, as --strict allows no warning")]
+pub struct StrictError;
+
+/// The light transport would be wrong.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error(
+    "the SNR on held-out patterns is only {0}: the photographs do not follow from their patterns, and nothing is \
+     written; --force writes the file nevertheless"
+)]
+pub struct UnusableError(pub Decibels);
 
 /// The error for a `--patterns` above the number of shots.
 pub fn too_few_shots(TooFewShots { wanted, available }: TooFewShots) -> Error {
@@ -40,40 +68,143 @@ pub fn warn_of_unknown_fields(folder: &CaptureFolder) {
 }
 
 /// Notes saturated samples, and warns if there are too many.
-pub fn warn_of_saturation(saturated: usize, measurements: &Measurements) {
+pub fn saturation(saturated: usize, measurements: &Measurements) -> Option<Warning> {
     if saturated == 0 {
-        return;
+        return None;
     }
     let percent = saturated_percent(saturated, measurements);
     eprintln!("note: {saturated} saturated samples ({percent:.1} %) are left out");
-    if has_implausible_saturation(saturated, measurements) {
-        eprintln!(
-            "warning: that is a large share; check \"camera.white\" in capture.json, or photograph \
-             with less exposure"
-        );
-    }
+    has_implausible_saturation(saturated, measurements).then(|| Warning {
+        code: "saturation",
+        message: "that is a large share; check \"camera.white\" in capture.json, or photograph with less \
+                  exposure"
+            .to_owned(),
+    })
 }
 
 /// Warns if the width of the band, or the SNR on held-out patterns, is doubtful.
-pub fn warn_of_preparation(prepared: &PreparedExport) {
+pub fn preparation(prepared: &PreparedExport) -> Vec<Warning> {
     let side = prepared.recovery.geometry().window.side();
+    let mut warnings = Vec::new();
     match prepared.band {
         None | Some(TailEstimate::Bounded { .. }) => {}
-        Some(TailEstimate::Unbounded) => eprintln!(
-            "warning: the band is at least as wide as the largest window tried, {side}x{side} light \
-             elements; a larger one can be given by --window"
-        ),
-        Some(TailEstimate::Undetermined) => eprintln!(
-            "warning: the photographs do not show how wide the band is; a window of {side}x{side} \
-             light elements is used, another can be given by --window"
-        ),
+        Some(TailEstimate::Unbounded) => warnings.push(Warning {
+            code: "band-unbounded",
+            message: format!(
+                "the band is at least as wide as the largest window tried, {side}x{side} light \
+                 elements; a larger one can be given by --window"
+            ),
+        }),
+        Some(TailEstimate::Undetermined) => warnings.push(Warning {
+            code: "band-undetermined",
+            message: format!(
+                "the photographs do not show how wide the band is; a window of {side}x{side} light \
+                 elements is used, another can be given by --window"
+            ),
+        }),
     }
     let snr = prepared.expected_snr();
     if let Some(snr) = snr.filter(|snr| *snr < MIN_PLAUSIBLE_SNR) {
+        warnings.push(Warning {
+            code: "low-snr",
+            message: format!(
+                "the SNR on held-out patterns is only {snr}; check that the photographs are linear, that \
+                 the light was steady and that the correspondence is right. With few patterns, or another \
+                 method than learned, it may not get better"
+            ),
+        });
+    }
+    warnings
+}
+
+/// Warns of pixels that are saturated in nearly all photographs.
+pub fn overexposure(pixels: usize) -> Option<Warning> {
+    (pixels > 0).then(|| Warning {
+        code: "overexposed",
+        message: format!(
+            "{pixels} pixels are saturated in nearly all photographs and will be white under any light; \
+             photograph with less exposure"
+        ),
+    })
+}
+
+/// Notes how photographs are corrected, and warns of those that are left out; `shots` are those of the measurements.
+pub fn photographs(
+    folder: &CaptureFolder,
+    shots: &[usize],
+    recovery: &PreparedRecovery,
+) -> Vec<Warning> {
+    let listed = &folder.manifest().shots;
+    note_corrections(recovery.corrections(), &|l| &listed[shots[l]].photo);
+    let warning = |&(l, fault): &(usize, PhotographFault)| {
+        let shot = |l: usize| &listed[shots[l]];
+        let (index, own) = (shots[l], shot(l));
+        let reason = match fault {
+            PhotographFault::PatternOf { other } => {
+                format!("it shows the pattern {} of shots[{}]", shot(other).pattern, shots[other])
+            }
+            PhotographFault::Blend { other, share } => format!(
+                "it shows a blend of its pattern and {:.0} % of {}: was it taken while the display changed?",
+                100.0 * share,
+                shot(other).pattern
+            ),
+            PhotographFault::UnknownPattern => format!(
+                "it shows neither {} nor any other pattern of this capture",
+                own.pattern
+            ),
+            PhotographFault::OtherObject => "it does not show this object as the others do".to_owned(),
+            PhotographFault::Distorted => {
+                "it differs from its prediction: did the camera or the object move, or did something cover it?"
+                    .to_owned()
+            }
+        };
+        Warning {
+            code: fault.code(),
+            message: format!("shots[{index}] ({}) is left out: {reason}", own.photo),
+        }
+    };
+    recovery.faults().iter().map(warning).collect()
+}
+
+/// Notes exposures and stray light that are corrected.
+fn note_corrections<'a>(corrections: &[LinearCorrection], name: &dyn Fn(usize) -> &'a String) {
+    if corrections.is_empty() {
+        return;
+    }
+    let gains = corrections.iter().map(|correction| correction.gain() - 1.0);
+    let count = corrections.len() as f64;
+    let deviation = (gains.clone().map(|gain| gain * gain).sum::<f64>() / count).sqrt();
+    if deviation > MIN_NOTED_DEVIATION {
         eprintln!(
-            "warning: the SNR on held-out patterns is only {snr}; check that the photographs are \
-             linear, that the light was steady and that the correspondence is right. With few \
-             patterns, or another method than learned, it may not get better"
+            "note: exposures differ from those declared by {:.1} % (standard deviation); this is corrected",
+            100.0 * deviation
+        );
+    }
+    let far = gains
+        .enumerate()
+        .filter(|(_, gain)| gain.abs() > MIN_NAMED_DEVIATION);
+    let far: Vec<String> = far
+        .map(|(l, gain)| format!("{} ({:.2} times)", name(l), 1.0 + gain))
+        .collect();
+    if !far.is_empty() {
+        eprintln!(
+            "note: exposed differently from the others: {}",
+            join_first(far.into_iter())
+        );
+    }
+    let stray = corrections
+        .iter()
+        .map(|correction| correction.stray_light());
+    let [least, most] = [
+        stray.clone().fold(f64::INFINITY, f64::min),
+        stray.fold(0.0, f64::max),
+    ];
+    if most > MIN_NOTED_DEVIATION {
+        eprintln!(
+            "note: stray light of {:.1} % to {:.1} % of white is subtracted; is there light that the dark \
+             photograph lacks?",
+            100.0 * least.max(0.0),
+            100.0 * most
         );
     }
 }

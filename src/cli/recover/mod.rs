@@ -14,6 +14,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 
 pub use self::args::RecoverArgs;
+pub use self::messages::StrictError;
 
 use self::job::{RecoverJob, thread_pool};
 use super::output_file::{LTM, OutputFile};

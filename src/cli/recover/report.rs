@@ -4,9 +4,10 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::args::RecoverArgs;
-use crate::capture::{Manifest, NoiseModel};
+use super::messages::Warning;
+use crate::capture::{CaptureFolder, Manifest, NoiseModel};
 use crate::cli::report::{format_bytes, format_shots, print_line};
-use crate::recover::{CommonModeWeight, Method, SparsityBasis};
+use crate::recover::{CommonModeWeight, LinearCorrection, Method, PreparedRecovery, SparsityBasis};
 use crate::transport::Decibels;
 
 /// Fields of `recover --json`; see docs/capture.md.
@@ -37,6 +38,45 @@ pub struct RecoverReport {
     /// Pixels saturated in nearly all photographs.
     pub overexposed_pixels: usize,
     pub file_bytes: u64,
+    /// One for each photograph that was read.
+    #[serde(rename = "photograph_table")]
+    pub photograph_reports: Vec<PhotographReport>,
+    pub warnings: Vec<Warning>,
+}
+
+/// What was found of one photograph.
+#[derive(Serialize)]
+pub struct PhotographReport {
+    /// Index in `shots`.
+    pub shot: usize,
+    pub photo: String,
+    /// Exposure relative to what is declared, and to the other photographs.
+    pub gain: f64,
+    /// Light in the photograph that does not come from the light plane, as a share of white.
+    pub stray_light: f64,
+    /// "used", or the code of the fault for which it is left out.
+    pub verdict: &'static str,
+}
+
+/// Reports of the photographs of `shots`.
+pub fn photograph_reports(
+    folder: &CaptureFolder,
+    shots: &[usize],
+    recovery: &PreparedRecovery,
+) -> Vec<PhotographReport> {
+    let report = |(l, &shot): (usize, &usize)| {
+        let correction = recovery.corrections().get(l).copied();
+        let correction = correction.unwrap_or(LinearCorrection::IDENTITY);
+        let fault = recovery.faults().iter().find(|fault| fault.0 == l);
+        PhotographReport {
+            shot,
+            photo: folder.manifest().shots[shot].photo.clone(),
+            gain: correction.gain(),
+            stray_light: correction.stray_light(),
+            verdict: fault.map_or("used", |(_, fault)| fault.code()),
+        }
+    };
+    shots.iter().enumerate().map(report).collect()
 }
 
 impl RecoverReport {

@@ -20,7 +20,10 @@ pub fn compressed_bound(content: u64) -> u64 {
 /// # Errors
 /// [`FormatError::Compress`].
 pub fn compress(content: &[u8]) -> Result<Vec<u8>, FormatError> {
-    zstd::bulk::compress(content, LEVEL).map_err(FormatError::Compress)
+    let mut frame = Vec::with_capacity(zstd_safe::compress_bound(content.len()));
+    zstd_safe::compress(&mut frame, content, LEVEL)
+        .map_err(|code| FormatError::Compress(zstd_safe::get_error_name(code)))?;
+    Ok(frame)
 }
 
 /// Decompresses one frame to exactly `length` bytes.

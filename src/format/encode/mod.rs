@@ -19,3 +19,8 @@ mod source_analysis;
 
 pub use assembly::EncodedFile;
 pub use encoder_input::{DistortionMetric, EncoderInput, EncodingTarget};
+
+/// `2^x`, by the exponential function, which recovery needs anyway: `libm::exp2` has a table of 4 kB.
+fn exp2(x: f64) -> f64 {
+    libm::exp(x * std::f64::consts::LN_2)
+}

@@ -3,6 +3,7 @@
 //! Both are found by bisection on a sample. Components whose energy is far below the quantisation error
 //! are then dropped.
 
+use super::exp2;
 use std::convert::Infallible;
 
 use super::assembly::{self, EncodedFile, QuantisedTile};
@@ -99,13 +100,13 @@ impl<'a, E: Executor> RateController<'a, E> {
         analysed.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
         let tiles: Vec<_> = tiles.into_iter().map(|t| analysed.rotated(t)).collect();
         let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
-            let scans = scan_plan::trial(analysed, (coarsest * libm::exp2(exponent)) as f32);
+            let scans = scan_plan::trial(analysed, (coarsest * exp2(exponent)) as f32);
             let decoded = |i: usize| decoded(analysed, &tiles[i], &scans);
             let loss = metric.loss(&analysed.executor.map(tiles.len(), decoded));
             Ok::<_, FormatError>(loss.0 <= max_loss.0)
         })?;
         analysed.has_functions = has_functions;
-        self.encode_with_step(Some((coarsest * libm::exp2(exponent)) as f32))
+        self.encode_with_step(Some((coarsest * exp2(exponent)) as f32))
     }
 
     fn encode_to_size(&mut self, limit: u64) -> Result<EncodedFile, FormatError> {
@@ -265,7 +266,7 @@ fn step_for(snr: Decibels, error: impl Fn(f32) -> SnrAccumulator) -> Option<f32>
         return None;
     }
     // Even a value as large as the norm is zero at twice that step.
-    let step = |exponent: f64| 2.0 * norm * libm::exp2(exponent) as f32;
+    let step = |exponent: f64| 2.0 * norm * exp2(exponent) as f32;
     let Ok([exponent, _]) = bisect(SNR_EXPONENTS, SNR_HALVINGS, |exponent| {
         Ok::<_, Infallible>(error(step(exponent)).finite_snr().0 >= snr.0)
     });

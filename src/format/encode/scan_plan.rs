@@ -9,6 +9,7 @@
 //!   the error by less than the same bytes do elsewhere;
 //! - any later scan. An item that is larger by itself is refined in several scans.
 
+use super::exp2;
 use std::ops::Range;
 
 use super::scan_costs::{RateDistortion, RateDistortionModel};
@@ -224,7 +225,7 @@ pub fn plan(
         scans
     };
     let exceeds = |exponent: f64| {
-        let scans = first_layer(step * libm::exp2(exponent) as f32);
+        let scans = first_layer(step * exp2(exponent) as f32);
         let compressed = |scan| model.compressed_bytes(scan, executor);
         let chunks = scans
             .iter()
@@ -234,7 +235,7 @@ pub fn plan(
         Ok::<_, FormatError>(bytes > shares.first * file_bytes)
     };
     let [_, exponent] = bisect([0.0, MAX_FIRST_STEP_EXPONENT], FIRST_STEP_TRIALS, exceeds)?;
-    let mut scans = first_layer(step * libm::exp2(exponent) as f32);
+    let mut scans = first_layer(step * exp2(exponent) as f32);
     let first_scans = scans.len();
     let max_bytes = shares.scan * file_bytes;
     for (items, last) in kinds.iter().zip(&last) {

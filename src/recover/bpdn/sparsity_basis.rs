@@ -1,7 +1,5 @@
 //! The orthonormal bases φ in which light transport functions may be sparse (paper, section 3, case (b)).
 
-use std::f64::consts::PI;
-
 /// φ, in which a light transport function has few large coefficients. The command line shows the variants' descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(
@@ -42,7 +40,7 @@ impl SparsityBasis {
                 for (i, row) in basis.chunks_exact_mut(side).enumerate() {
                     let norm = (if i == 0 { 1.0 } else { 2.0 } / side as f64).sqrt();
                     for (j, b) in row.iter_mut().enumerate() {
-                        *b = norm * libm::cos(PI * i as f64 * (j as f64 + 0.5) / side as f64);
+                        *b = norm * crate::linalg::cos_pi(i * (2 * j + 1), 2 * side);
                     }
                 }
             }

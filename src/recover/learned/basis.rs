@@ -7,8 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::capture::Measurements;
 use crate::linalg::{multiply_rows, vectorise};
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::transport::{Basis, Geometry, LightElement};
 
 /// Responses computed together at least: two vector registers of f32 on the narrowest machine of note.
@@ -54,7 +54,7 @@ impl LearnedBasis {
     /// The responses to every pattern, in the colour of channel `plane`, of the window at `origin`.
     pub fn respond(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         geometry: &Geometry,
         origin: LightElement,
         plane: usize,

@@ -7,14 +7,13 @@
 //!
 //! B and y are weighted by the patterns' exposures, and the patterns' common mode by [`CommonModeWeight::POOLED`].
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::basis::{LearnedBasis, PatternResponses};
-use crate::capture::Measurements;
 use crate::linalg::{dot, sort, vectorise};
 use crate::recover::common_mode_weight::CommonModeWeight;
 use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::recover::sampling::{PixelsSharingWindow, pixels_by_window, usable_samples};
 use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry, TileRect};
 
@@ -79,7 +78,7 @@ pub(super) struct ObservationEquations {
 impl ObservationEquations {
     /// The equations of the pixels `rect` from the patterns `pattern_indices`.
     pub fn new(
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         geometry: &Geometry,
         basis: &LearnedBasis,
         pattern_indices: &[usize],
@@ -107,20 +106,28 @@ impl ObservationEquations {
     }
 
     pub fn count_gram_matrices(
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         geometry: &Geometry,
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> usize {
-        let mut sets = BTreeSet::new();
-        for (plane, channels) in measurements.planes() {
-            let samples = rect.pixels();
-            for (pixel, c) in samples.flat_map(|p| channels.clone().map(move |c| (p, c))) {
-                let (patterns, _) = usable_samples(measurements, pattern_indices, pixel, c);
-                sets.insert((geometry.window_origin(pixel), plane, patterns));
+        let mut count = 0;
+        for (_, pixels) in pixels_by_window(geometry, rect) {
+            for (_, channels) in measurements.planes() {
+                let mut sets: Vec<Vec<usize>> = Vec::new();
+                for (pixel, c) in pixels
+                    .iter()
+                    .flat_map(|p| channels.clone().map(move |c| (p.1, c)))
+                {
+                    let (patterns, _) = usable_samples(measurements, pattern_indices, pixel, c);
+                    if !sets.contains(&patterns) {
+                        sets.push(patterns);
+                    }
+                }
+                count += sets.len();
             }
         }
-        sets.len()
+        count
     }
 
     /// BᵀB of an observation, `[r, r]`, both triangles.
@@ -145,7 +152,7 @@ impl ObservationEquations {
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn add_window(
         &mut self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         geometry: &Geometry,
         pattern_indices: &[usize],
         (responses, pixels, channels): (&PatternResponses, &PixelsSharingWindow, Range<usize>),
@@ -192,7 +199,11 @@ pub(super) fn min_reliable_brightness(brightnesses: &[f64]) -> MinReliableBright
 }
 
 /// `rect` with a border of `margin` pixels, where the picture has such pixels and their measurements are loaded.
-pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u32) -> TileRect {
+pub(super) fn with_margin(
+    measurements: &CalibratedMeasurements<'_>,
+    rect: TileRect,
+    margin: u32,
+) -> TileRect {
     let camera = measurements.camera;
     let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);
     let is_loaded = |y: &u32| measurements.rows.index_of(*y).is_some();
@@ -222,7 +233,7 @@ struct WeightedBasisResponses {
 impl WeightedBasisResponses {
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn new(
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         responses: &PatternResponses,
         pattern_indices: Vec<usize>,
     ) -> Self {
@@ -249,7 +260,7 @@ impl WeightedBasisResponses {
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn observe(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         c: usize,
         mut y: Vec<f64>,
         right_hand_side: &mut [f64],

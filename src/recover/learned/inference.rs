@@ -13,9 +13,9 @@ use super::nonnegativity::NonNegativityPenalty;
 use super::posterior::PosteriorSolver;
 use super::posterior_means::{NEIGHBOURHOOD_RADIUS, PixelObservationPosition, PosteriorMeans};
 use super::prior::Prior;
-use crate::capture::Measurements;
 use crate::linalg::vectorise;
 use crate::recover::holdout_split::HoldoutSplit;
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::recover::prediction;
 use crate::transport::{CHANNELS, FloatTile, Geometry, TileRect, TileTransportFunctions};
 
@@ -41,7 +41,7 @@ impl LearnedModel {
     /// Recovers one tile from the patterns `pattern_indices`.
     pub fn tile(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> FloatTile {
@@ -53,7 +53,7 @@ impl LearnedModel {
     /// The equations of a tile and its halo.
     fn equations(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> ObservationEquations {
@@ -125,7 +125,7 @@ impl LearnedModel {
     /// the neighbour prior. Saturated samples do not count.
     pub fn held_out_errors(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         split: &HoldoutSplit,
         rect: TileRect,
     ) -> [f64; 2] {

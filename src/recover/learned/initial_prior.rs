@@ -23,25 +23,6 @@ const SUBSPACE_ITERATIONS: usize = 4;
 const CORRELATION_LENGTH: f64 = 1.0;
 /// Variance of the variations, as a share of h².
 const RELATIVE_VARIANCE: f64 = 0.3;
-/// Standard deviation, in elements, of the Gaussian that smooths the noisy mean function.
-const SMOOTHING_SIGMA: f64 = 1.0;
-
-/// Smooths a function on the window, `[side²]`, by a Gaussian and scales it to sum 1.
-pub(super) fn smooth(function: &[f64], side: usize) -> Vec<f64> {
-    let radius = (3.0 * SMOOTHING_SIGMA).ceil() as i64;
-    let tap = |d: i64| libm::exp(-0.5 * (d as f64 / SMOOTHING_SIGMA).powi(2));
-    let norm: f64 = (-radius..=radius).map(tap).sum();
-    // Along one axis, `[side, side]`.
-    let blur = (0..side * side).map(|i| match (i / side).abs_diff(i % side) as i64 {
-        distance if distance <= radius => tap(distance) / norm,
-        _ => 0.0,
-    });
-    let blur: Vec<f64> = blur.collect();
-    let rows = linalg::multiply(function, &blur, side, side);
-    let smoothed = linalg::multiply(&blur, &rows, side, side);
-    let sum: f64 = smoothed.iter().sum();
-    smoothed.iter().map(|m| m / sum).collect()
-}
 
 /// The initial basis around `mean`, `[r, side²]`, orthonormal, and the prior over it.
 pub(super) fn initial_prior(
@@ -70,9 +51,7 @@ pub(super) fn initial_prior(
     };
     // Cosines of rising frequency times h are near the eigenvectors.
     let frequencies = (0..).flat_map(|sum| (0..=sum).map(move |v| (v, sum - v)));
-    let cosine = |f: usize, x: usize| {
-        libm::cos(std::f64::consts::PI * f as f64 * (x as f64 + 0.5) / side as f64)
-    };
+    let cosine = |f: usize, x: usize| linalg::cos_pi(f * (2 * x + 1), 2 * side);
     let mut functions: Vec<f64> = Vec::with_capacity(rank * area);
     for (fv, fu) in frequencies.take(rank) {
         let value = |s: usize| cosine(fv, s / side) * cosine(fu, s % side) * mean[s].max(1e-9);
@@ -160,6 +139,7 @@ pub(super) fn truncate_basis(
 mod tests {
     use super::*;
     use crate::job_executor::SequentialExecutor;
+    use crate::recover::mean_function::smooth;
 
     #[test]
     fn initial_basis_is_orthonormal() {

@@ -39,9 +39,9 @@ use serde::{Deserialize, Serialize};
 use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::holdout_split::HoldoutSplit;
+use super::photometry::CalibratedMeasurements;
 use super::pixelwise::PixelwiseRecovery;
 use super::preparation_input::RecoveryPreparationInput;
-use crate::capture::Measurements;
 use crate::job_executor::Executor;
 use crate::transport::{
     Basis, CHANNELS, FloatTile, Geometry, TileRect, TileTransportFunctions, Window,
@@ -117,7 +117,7 @@ impl LearnedRecovery {
     /// Recovers one tile from all patterns.
     pub fn tile(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         split: &HoldoutSplit,
         rect: TileRect,
     ) -> FloatTile {
@@ -136,7 +136,7 @@ impl LearnedRecovery {
     /// of the blend.
     pub fn training_tile(
         &self,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         split: &HoldoutSplit,
         rect: TileRect,
     ) -> FloatTile {

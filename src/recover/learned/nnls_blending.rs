@@ -8,10 +8,10 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::inference::LearnedModel;
-use crate::capture::Measurements;
 use crate::job_executor::Executor;
 use crate::recover::error::RecoverError;
 use crate::recover::holdout_split::HoldoutSplit;
+use crate::recover::photometry::CalibratedMeasurements;
 use crate::recover::pixelwise::PixelwiseRecovery;
 use crate::recover::prediction;
 use crate::recover::preparation_input::RecoveryPreparationInput;
@@ -44,7 +44,7 @@ impl BlendingGram {
     /// do not count.
     pub fn new(
         model: &LearnedModel,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         split: &HoldoutSplit,
         [learned, nnls]: [&TileTransportFunctions; 2],
     ) -> Self {
@@ -66,7 +66,7 @@ impl BlendingGram {
     pub fn recover(
         model: &LearnedModel,
         nnls: &PixelwiseRecovery,
-        measurements: &Measurements,
+        measurements: &CalibratedMeasurements<'_>,
         split: &HoldoutSplit,
         rect: TileRect,
     ) -> Self {

@@ -4,10 +4,10 @@ use super::basis::LearnedBasis;
 use super::equations::{ObservationEquations, PixelObservation};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
-use crate::capture::{CameraRowSet, NoiseModel, Pattern};
+use crate::capture::{CameraRowSet, Measurements, NoiseModel, Pattern};
 use crate::job_executor::{Executor, SequentialExecutor};
 use crate::recover::sampling::pixels_by_window;
-use crate::recover::{TailEstimate, WindowSizeEstimate, mean_function};
+use crate::recover::{TailEstimate, WindowSizeEstimate, mean_function, pattern_check};
 use crate::transport::{
     CHANNELS, CameraPixel, Correspondence, Extent, TileTransportFunctions, Window,
 };
@@ -150,7 +150,7 @@ fn snr(tiles: &[TileTransportFunctions], tau: &[[f64; CHANNELS]]) -> f64 {
 }
 
 fn preparation<'a, E: Executor>(
-    measurements: &'a Measurements,
+    measurements: &'a CalibratedMeasurements<'a>,
     split: &'a HoldoutSplit,
     executor: &'a E,
 ) -> RecoveryPreparationInput<'a, E> {
@@ -167,9 +167,11 @@ fn learn(
     executor: &impl Executor,
 ) -> Result<LearnedRecovery, RecoverError> {
     let split = HoldoutSplit::new(&measurements.patterns);
-    let preparation = preparation(measurements, &split, executor);
+    let measurements = CalibratedMeasurements::uncorrected(measurements);
+    let preparation = preparation(&measurements, &split, executor);
     pollster::block_on(async {
         let mean = mean_function::mean_function(&preparation).await?;
+        pattern_check::check_patterns(&preparation, &mean).await?;
         LearnedRecovery::new(&preparation, &mean).await
     })
 }
@@ -236,6 +238,7 @@ pub(super) fn synthetic_equations(
 fn learned_recovery_beats_least_squares_with_few_patterns() {
     let geometry = geometry();
     let (measurements, tau) = measurements(20, 7);
+    let measurements = CalibratedMeasurements::uncorrected(&measurements);
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
     let split = HoldoutSplit::new(&measurements.patterns);
     let preparation = preparation(&measurements, &split, &SequentialExecutor);
@@ -271,6 +274,7 @@ fn short_exposures_weigh_less_than_long_ones() {
     }
     let geometry = geometry();
     let recovered = |measurements: &Measurements| {
+        let measurements = &CalibratedMeasurements::uncorrected(measurements);
         let learned = learn(measurements, &SequentialExecutor).unwrap();
         let split = HoldoutSplit::new(&measurements.patterns);
         let preparation = preparation(measurements, &split, &SequentialExecutor);
@@ -296,6 +300,7 @@ fn short_exposures_weigh_less_than_long_ones() {
 fn execution_order_does_not_change_the_result() {
     let geometry = geometry();
     let (measurements, _) = measurements(12, 3);
+    let measurements = CalibratedMeasurements::uncorrected(&measurements);
     let one = learn(&measurements, &SequentialExecutor).unwrap();
     let other = learn(&measurements, &ReverseOrder).unwrap();
     assert_eq!(one.basis(), other.basis());
@@ -312,11 +317,12 @@ fn training_uses_pixels_with_saturated_samples() {
     let geometry = geometry();
     let (mut measurements, tau) = measurements(20, 7);
     let windows = pixels_by_window(&geometry, picture());
-    for (i, pixels) in windows.values().enumerate() {
+    for (i, (_, pixels)) in windows.iter().enumerate() {
         for &(n, _) in pixels {
             measurements.photos[i % 20][n] = [f32::NAN; CHANNELS];
         }
     }
+    let measurements = CalibratedMeasurements::uncorrected(&measurements);
     let learned = learn(&measurements, &SequentialExecutor).unwrap();
     let split = HoldoutSplit::new(&measurements.patterns);
     let tiles = geometry.tiles().map(|rect| {
@@ -358,6 +364,7 @@ fn blending_improves_sparse_unrelated_functions() {
         }
     }
     let measurements = photograph(40, 7, &tau);
+    let measurements = CalibratedMeasurements::uncorrected(&measurements);
     let mut learned = learn(&measurements, &SequentialExecutor).unwrap();
     assert!(learned.nnls.is_some());
     let split = HoldoutSplit::new(&measurements.patterns);
@@ -447,6 +454,7 @@ fn two_by_two() -> TileRect {
 #[test]
 fn posterior_mean_minimises_the_negative_log_posterior() {
     let (measurements, _) = measurements(10, 5);
+    let measurements = CalibratedMeasurements::uncorrected(&measurements);
     let all: Vec<usize> = (0..10).collect();
     let basis = single_elements();
     let equations =
@@ -483,13 +491,15 @@ fn a_saturated_sample_counts_as_missing() {
     let (mut measurements, _) = measurements(10, 5);
     let basis = single_elements();
     let without: Vec<usize> = (0..10).filter(|&l| l != 4).collect();
+    let uncorrected = CalibratedMeasurements::uncorrected(&measurements);
     let clean =
-        ObservationEquations::new(&measurements, &geometry(), &basis, &without, two_by_two());
+        ObservationEquations::new(&uncorrected, &geometry(), &basis, &without, two_by_two());
     let n = geometry().camera.index(CameraPixel { x: 21, y: 20 });
     measurements.photos[4][n] = [f32::NAN; CHANNELS];
     let all: Vec<usize> = (0..10).collect();
+    let uncorrected = CalibratedMeasurements::uncorrected(&measurements);
     let saturated =
-        ObservationEquations::new(&measurements, &geometry(), &basis, &all, two_by_two());
+        ObservationEquations::new(&uncorrected, &geometry(), &basis, &all, two_by_two());
     for index in 3..6 {
         assert_eq!(saturated.gram(index), clean.gram(index));
         assert_eq!(
@@ -515,6 +525,7 @@ fn rgb_patterns_with_equal_channels_equal_grey_patterns() {
     }
     let all: Vec<usize> = (0..8).collect();
     let basis = single_elements();
+    let [grey, colour] = [&grey, &colour].map(CalibratedMeasurements::uncorrected);
     let a = ObservationEquations::new(&grey, &geometry(), &basis, &all, two_by_two());
     let b = ObservationEquations::new(&colour, &geometry(), &basis, &all, two_by_two());
     for index in 0..12 {

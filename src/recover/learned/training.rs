@@ -11,9 +11,7 @@
 use super::basis::LearnedBasis;
 use super::equations::{ObservationEquations, with_margin};
 use super::inference::LearnedModel;
-use super::initial_prior::{
-    MAX_INITIAL_RANK, initial_prior, principal_axes, smooth, truncate_basis,
-};
+use super::initial_prior::{MAX_INITIAL_RANK, initial_prior, principal_axes, truncate_basis};
 use super::neighbour_prior::NeighbourPrior;
 use super::nnls_blending::centre;
 use super::nonnegativity::NonNegativityPenalty;
@@ -73,7 +71,7 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
         mean_function: &[f64],
     ) -> Result<LearnedModel, RecoverError> {
         let side = self.geometry.window.side() as usize;
-        let mean = smooth(mean_function, side);
+        let mean = mean_function::smooth(mean_function, side);
         let (functions, mut prior) = initial_prior(&mean, side, self.executor);
         let basis = LearnedBasis::new(&functions, &mean);
         let squares = mean_function::sample_squares(self.measurements);

@@ -255,7 +255,7 @@ impl Recovery {
 
     pub(super) fn record(&self, index: usize) -> io::Result<Vec<u8>> {
         let record = self.records.get(index).cloned().flatten();
-        record.ok_or_else(|| io::Error::new(ErrorKind::NotFound, "a tile is not recovered yet"))
+        record.ok_or_else(|| io::Error::from(ErrorKind::NotFound))
     }
 
     pub(super) fn metadata(&self) -> crate::format::Metadata {

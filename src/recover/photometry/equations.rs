@@ -1,0 +1,290 @@
+//! Generalised least squares for the corrections of all photographs.
+//!
+//! A correction `s_l y_l + o_l` of small effect changes a pixel's scaled residual `r = y − m` by `D_y (s − 1) + o/f`, with
+//! `D_y = diag(y)`. The corrections minimise `Σ rᵀ K⁻¹ r` over sampled pixels and channels. The objective is quadratic:
+//! one step leads to its minimum, but for the brightness f, which depends on the corrections.
+//!
+//! Unknowns are `[scales, offsets, leak]`, L scales and L offsets. The scales' mean is fixed, as brightness absorbs it.
+//! The leak is the light from outside the window relative to brightness, nearly constant, the same for all pixels: it must
+//! not pass for stray light, which does not depend on brightness.
+
+use super::window_covariance::{ScaledPixel, WindowCovariance};
+use crate::job_executor::{Cancelled, Executor, PARTS};
+use crate::linalg::{self, add_scaled, dot, vectorise};
+use crate::recover::preparation_input::RecoveryPreparationInput;
+use crate::recover::sampling::{self, PixelsSharingWindow};
+use crate::transport::{LightElement, TileRect};
+
+/// Weight of the constraint on the scales' mean, relative to the equations'.
+const GAUGE_WEIGHT: f64 = 1e3;
+/// Added to the mean squared deviation of a pixel's photographs, whose inverse weights the pixel: how far functions are
+/// from the mean function differs between parts of an object.
+const MIN_DEVIATION: f64 = 0.1;
+/// Ridge relative to the equations' diagonal: a dark photograph has no equations of its own.
+const RIDGE: f64 = 1e-8;
+
+/// The corrections that improve the fit most, and how well the photographs fit without them.
+pub(super) struct CorrectionStep {
+    /// Change of each photograph's scale and offset, `[2][L]`.
+    pub steps: [Vec<f64>; 2],
+    /// Standard errors of the same.
+    pub errors: [Vec<f64>; 2],
+    /// Standard error of the offsets' mean.
+    pub mean_offset_error: f64,
+    /// Energy of the leave-one-out residuals, relative to that of the measurements' differences between photographs.
+    pub unexplained_share: f64,
+    /// Mean square of each photograph's leave-one-out residuals, by their expected variances and relative to the mean of
+    /// all photographs of a pixel, `[L]`.
+    pub deviations: Vec<f64>,
+}
+
+/// Fits the corrections of the photographs `pattern_indices` on one window of each square; `mean_function` is `[slot]`.
+/// `None` if too little is measured.
+///
+/// # Errors
+/// [`Cancelled`].
+pub(super) async fn fit(
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
+    mean_function: &[f64],
+    squares: &[TileRect],
+    pattern_indices: &[usize],
+) -> Result<Option<CorrectionStep>, Cancelled> {
+    let (executor, patterns) = (preparation.executor, pattern_indices.len());
+    let share = |part: usize| part * squares.len() / PARTS;
+    let sum_part = |part: usize| {
+        let mut sums = Sums::zeros(patterns);
+        for square in &squares[share(part)..share(part + 1)] {
+            sums.scores
+                .resize(sums.scores.len() + unknowns(patterns), 0.0);
+            for_largest_window(preparation, *square, |origin, pixels| {
+                vectorise(
+                    #[cfg_attr(target_arch = "x86_64", inline(always))]
+                    || sums.add_window(preparation, mean_function, pattern_indices, origin, pixels),
+                );
+            });
+        }
+        sums.into_values()
+    };
+    let parts = executor.all_gather(PARTS, sum_part).await?;
+    let mut total = Sums::zeros(patterns);
+    parts.iter().for_each(|part| total.add_values(part));
+    Ok(total.solve())
+}
+
+/// Gives the window that most pixels of a square share, and these pixels.
+pub(super) fn for_largest_window(
+    preparation: &RecoveryPreparationInput<'_, impl Executor>,
+    square: TileRect,
+    mut visit: impl FnMut(LightElement, &PixelsSharingWindow),
+) {
+    let windows = sampling::pixels_by_window(&preparation.geometry, square);
+    // The first of equals.
+    let largest = windows.iter().rev().max_by_key(|(_, pixels)| pixels.len());
+    if let Some((origin, pixels)) = largest {
+        visit(*origin, pixels);
+    }
+}
+
+struct Sums {
+    patterns: usize,
+    /// `[2L + 1, 2L + 1]`; of the blocks, upper and diagonal ones.
+    hessian: Vec<f64>,
+    /// Sums of [`CorrectionStep::deviations`], `[L]`.
+    deviations: Vec<f64>,
+    /// Number of pixels and channels.
+    count: f64,
+    /// Energies of leave-one-out residuals and of differences between photographs.
+    energies: [f64; 2],
+    /// Negative gradient of each square, `[square, 2L + 1]`.
+    scores: Vec<f64>,
+}
+
+fn unknowns(patterns: usize) -> usize {
+    2 * patterns + 1
+}
+
+impl Sums {
+    fn zeros(patterns: usize) -> Self {
+        Self {
+            patterns,
+            hessian: vec![0.0; unknowns(patterns).pow(2)],
+            deviations: vec![0.0; patterns],
+            count: 0.0,
+            energies: [0.0; 2],
+            scores: Vec::new(),
+        }
+    }
+
+    /// Everything in one list.
+    fn into_values(self) -> Vec<f64> {
+        let energies = vec![self.count, self.energies[0], self.energies[1]];
+        [self.hessian, self.deviations, energies, self.scores].concat()
+    }
+
+    /// Adds the list of another part, whose squares follow.
+    fn add_values(&mut self, values: &[f64]) {
+        let (hessian, rest) = values.split_at(self.hessian.len());
+        let (deviations, rest) = rest.split_at(self.patterns);
+        add_scaled(&mut self.hessian, 1.0, hessian);
+        add_scaled(&mut self.deviations, 1.0, deviations);
+        self.count += rest[0];
+        add_scaled(&mut self.energies, 1.0, &rest[1..3]);
+        self.scores.extend_from_slice(&rest[3..]);
+    }
+
+    /// Adds a window to the sums and to the last square's score.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    fn add_window(
+        &mut self,
+        preparation: &RecoveryPreparationInput<'_, impl Executor>,
+        mean_function: &[f64],
+        pattern_indices: &[usize],
+        origin: LightElement,
+        pixels: &PixelsSharingWindow,
+    ) {
+        let measurements = preparation.measurements;
+        for (plane, channels) in measurements.planes() {
+            let window = WindowCovariance::new(
+                measurements,
+                &preparation.geometry,
+                mean_function,
+                origin,
+                plane,
+                pattern_indices,
+            );
+            let Some(window) = window else { continue };
+            let pixels = window.scaled_pixels(measurements, pixels, channels, pattern_indices);
+            self.add_pixels(&window, &pixels);
+        }
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    fn add_pixels(&mut self, window: &WindowCovariance, pixels: &[ScaledPixel]) {
+        let l = self.patterns;
+        let n = unknowns(l);
+        let start = self.scores.len() - n;
+        let score = &mut self.scores[start..];
+        // `K⁻¹1`: what the leak's column becomes.
+        let leak: Vec<f64> = window
+            .inverse
+            .chunks_exact(l)
+            .map(|row| row.iter().sum())
+            .collect();
+        // Sums over pixels of the products of the columns y, y/f, y·leak, 1/f², leak/f and leak².
+        let mut products = vec![0.0; l * l];
+        let (mut offset_sums, mut leak_sums) = (vec![0.0; l], vec![0.0; l]);
+        let [mut offsets, mut leaks, mut offset_leaks] = [0.0; 3];
+        let mut solved = vec![0.0; l];
+        for pixel in pixels {
+            linalg::multiply_vector(&window.inverse, &pixel.residual(&window.means), &mut solved);
+            let deviation = |i: usize| solved[i] * solved[i] / window.inverse[i * l + i];
+            let mean = (0..l).map(deviation).sum::<f64>() / l as f64;
+            let weight = 1.0 / (mean + MIN_DEVIATION);
+            let mean = pixel.y.iter().sum::<f64>() / l as f64;
+            for i in 0..l {
+                score[i] -= weight * pixel.y[i] * solved[i];
+                score[l + i] -= weight * pixel.unit * solved[i];
+                self.deviations[i] += weight * deviation(i);
+                let left_out = solved[i] / window.inverse[i * l + i];
+                self.energies[0] += weight * left_out * left_out;
+                self.energies[1] += weight * (pixel.y[i] - mean).powi(2);
+                let products = &mut products[i * l..(i + 1) * l];
+                add_scaled(products, weight * pixel.y[i], &pixel.y);
+            }
+            score[2 * l] -= weight * pixel.certainty * solved.iter().sum::<f64>();
+            add_scaled(&mut offset_sums, weight * pixel.unit, &pixel.y);
+            add_scaled(&mut leak_sums, weight * pixel.certainty, &pixel.y);
+            offsets += weight * pixel.unit * pixel.unit;
+            offset_leaks += weight * pixel.unit * pixel.certainty;
+            leaks += weight * pixel.certainty * pixel.certainty;
+        }
+        self.count += pixels.len() as f64;
+        let (scale_rows, rows) = self.hessian.split_at_mut(n * l);
+        let (offset_rows, leak_row) = rows.split_at_mut(n * l);
+        for (i, row) in scale_rows.chunks_exact_mut(n).enumerate() {
+            let inverse = &window.inverse[i * l..(i + 1) * l];
+            linalg::add_products(&mut row[..l], inverse, &products[i * l..(i + 1) * l]);
+            add_scaled(&mut row[l..2 * l], offset_sums[i], inverse);
+            row[2 * l] += leak_sums[i] * leak[i];
+        }
+        for (i, row) in offset_rows.chunks_exact_mut(n).enumerate() {
+            add_scaled(
+                &mut row[l..2 * l],
+                offsets,
+                &window.inverse[i * l..(i + 1) * l],
+            );
+            row[2 * l] += offset_leaks * leak[i];
+        }
+        leak_row[2 * l] += leaks * leak.iter().sum::<f64>();
+    }
+
+    fn solve(&self) -> Option<CorrectionStep> {
+        let l = self.patterns;
+        let n = unknowns(l);
+        // Scaled to a diagonal of 1.
+        let diagonal = |i: usize| {
+            self.hessian[i * n + i]
+                .max(f64::MIN_POSITIVE)
+                .sqrt()
+                .recip()
+        };
+        let scale: Vec<f64> = (0..n).map(diagonal).collect();
+        let mut matrix = vec![0.0; n * n];
+        for i in 0..n {
+            for j in i..n {
+                matrix[i * n + j] = scale[i] * scale[j] * self.hessian[i * n + j];
+            }
+            matrix[i * n + i] += RIDGE;
+        }
+        let norm: f64 = scale[..l].iter().map(|s| s * s).sum();
+        for i in 0..l {
+            let factor = GAUGE_WEIGHT * scale[i] / norm;
+            add_scaled(&mut matrix[i * n + i..i * n + l], factor, &scale[i..l]);
+        }
+        linalg::cholesky(&mut matrix, n)?;
+        let solve = |score: &[f64]| -> Vec<f64> {
+            let mut x: Vec<f64> = score.iter().zip(&scale).map(|(b, s)| b * s).collect();
+            linalg::cholesky_solve(&matrix, &mut x);
+            x.iter().zip(&scale).map(|(x, s)| x * s).collect()
+        };
+        let mut step = vec![0.0; n];
+        let mut variances = vec![0.0; n];
+        let mut mean_offset_variance = 0.0;
+        let shares: Vec<Vec<f64>> = self.scores.chunks_exact(n).map(solve).collect();
+        shares
+            .iter()
+            .for_each(|share| add_scaled(&mut step, 1.0, share));
+        for share in &shares {
+            let mut deviation = share.clone();
+            add_scaled(&mut deviation, -1.0 / shares.len() as f64, &step);
+            linalg::add_products(&mut variances, &deviation, &deviation);
+            let mean = deviation[l..2 * l].iter().sum::<f64>() / l as f64;
+            mean_offset_variance += mean * mean;
+        }
+        let errors: Vec<f64> = variances.iter().map(|variance| variance.sqrt()).collect();
+        let deviations = self.deviations.iter().map(|d| d / self.count);
+        let halves = |values: &[f64]| [values[..l].to_vec(), values[l..2 * l].to_vec()];
+        (self.count > 0.0).then(|| CorrectionStep {
+            steps: halves(&step),
+            errors: halves(&errors),
+            mean_offset_error: mean_offset_variance.sqrt(),
+            unexplained_share: self.energies[0] / self.energies[1],
+            deviations: deviations.collect(),
+        })
+    }
+}
+
+/// The leave-one-out model's prediction of photographs that it does not use, `[other]`, for a pixel of `window`.
+pub(super) fn predict(
+    window: &WindowCovariance,
+    others: &WindowCovariance,
+    pixel: &ScaledPixel,
+) -> Vec<f64> {
+    let l = window.means.len();
+    let mut solved = vec![0.0; l];
+    linalg::multiply_vector(&window.inverse, &pixel.residual(&window.means), &mut solved);
+    let cross = window.cross_covariance(others);
+    let rows = cross.chunks_exact(l).zip(&others.means);
+    rows.map(|(row, mean)| pixel.certainty * mean + dot(row, &solved))
+        .collect()
+}

@@ -1,0 +1,41 @@
+//! Photometric calibration: what each photograph has of its own, and which photographs do not belong to the capture.
+//!
+//! Shutters and lamps make every photograph's exposure differ a little from what is declared, and room light comes and
+//! goes. Photograph l of a pixel is taken to be `y_l = g_l · p_l T + b_l`, with a gain g and a stray light b that all
+//! pixels and channels share. Under the Gaussian model of light transport functions around the mean function, a pixel's
+//! measurements have a known covariance K, so gains and stray light follow by generalised least squares
+//! ([`equations`]): the functions themselves are integrated out. Standard errors come from the scatter between squares of
+//! the picture (clusters, as in Liang and Zeger 1986), and only what exceeds them is corrected ([`estimate`]).
+//!
+//! The same model predicts every photograph from all the others (leave-one-out prediction, Rasmussen and Williams 2006,
+//! section 5.4.2). A photograph that is predicted far worse than the others is left out, with the [fault](faults) that it
+//! most looks like.
+
+mod calibrated_measurements;
+mod equations;
+mod estimate;
+mod faults;
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod tests;
+mod window_covariance;
+
+pub(super) use calibrated_measurements::CalibratedMeasurements;
+pub use calibrated_measurements::LinearCorrection;
+pub(super) use estimate::estimate;
+pub use faults::PhotographFault;
+
+/// Corrections of the photographs, and those that are left out.
+#[derive(Clone, Debug, Default)]
+pub struct Photometry {
+    /// One for each photograph; none at all if no photograph needs one.
+    pub corrections: Vec<LinearCorrection>,
+    /// The photographs that are left out, by their indices in the measurements, with the fault that each looks like.
+    pub faults: Vec<(usize, PhotographFault)>,
+}
+
+impl Photometry {
+    /// Whether photographs are corrected or left out.
+    pub fn has_changes(&self) -> bool {
+        !self.corrections.is_empty() || !self.faults.is_empty()
+    }
+}

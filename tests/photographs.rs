@@ -1,0 +1,194 @@
+//! Recovery from photographs with faults: what `ltm-export recover` corrects, leaves out and says.
+#![cfg(not(target_arch = "wasm32"))]
+#![allow(clippy::unwrap_used)] // a panic fails the test
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use assert_cmd::Command;
+use image::{ImageBuffer, Rgb};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use common::copy_folder;
+
+type Photograph = ImageBuffer<Rgb<u16>, Vec<u16>>;
+
+/// Black and white levels of the fixture.
+const BLACK: f64 = 512.0;
+const WHITE: f64 = 60_000.0;
+
+/// A copy of the capture `glass-s`.
+struct Capture {
+    _folder: TempDir,
+    path: PathBuf,
+}
+
+impl Capture {
+    fn new() -> Self {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("glass-s");
+        let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/glass-s");
+        copy_folder(&fixture, &path);
+        Self {
+            _folder: folder,
+            path,
+        }
+    }
+
+    fn photo(&self, l: usize) -> PathBuf {
+        self.path.join(format!("photos/{l:04}.png"))
+    }
+
+    fn read(&self, l: usize) -> Photograph {
+        image::open(self.photo(l)).unwrap().to_rgb16()
+    }
+
+    /// Replaces the samples of a photograph, as measurements: 0 at black and 1 at white.
+    fn change(&self, l: usize, y: impl Fn(usize, f64) -> f64) {
+        let mut photo = self.read(l);
+        for (i, sample) in photo.iter_mut().enumerate() {
+            let measured = (f64::from(*sample) - BLACK) / (WHITE - BLACK);
+            *sample = (BLACK + (WHITE - BLACK) * y(i, measured)).round() as u16;
+        }
+        photo.save(self.photo(l)).unwrap();
+    }
+
+    fn output(&self) -> PathBuf {
+        self.path.join("out.ltm")
+    }
+
+    fn recover(&self, more: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
+        command
+            .arg("recover")
+            .arg(&self.path)
+            .arg("-o")
+            .arg(self.output());
+        command
+            .args(["--method", "nnls", "--json"])
+            .args(more)
+            .output()
+            .unwrap()
+    }
+
+    fn report(&self) -> (Value, String) {
+        let output = self.recover(&[]);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{errors}");
+        (serde_json::from_slice(&output.stdout).unwrap(), errors)
+    }
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+#[test]
+fn exposures_and_stray_light_are_corrected_and_reported() {
+    let clean = Capture::new();
+    let (clean, errors) = clean.report();
+    assert_eq!(clean["warnings"], Value::Array(Vec::new()));
+    assert!(!errors.contains("note:"), "{errors}");
+    let table = clean["photograph_table"].as_array().unwrap();
+    assert!(
+        table
+            .iter()
+            .all(|photo| photo["gain"] == 1.0 && photo["verdict"] == "used")
+    );
+
+    let faulty = Capture::new();
+    let gain = |l: usize| 1.0 + 0.03 * (l as f64 * 2.4).sin();
+    for l in 0..60 {
+        faulty.change(l, |_, y| gain(l) * y + 0.01 * l as f64 / 60.0);
+    }
+    let (report, errors) = faulty.report();
+    for note in ["exposures differ", "2.1 %", "stray light", "is subtracted"] {
+        assert!(errors.contains(note), "no {note}: {errors}");
+    }
+    let table = report["photograph_table"].as_array().unwrap();
+    assert_eq!(table.len(), 54);
+    let ratios = table.iter().map(|photo| {
+        let l = photo["shot"].as_u64().unwrap() as usize;
+        let stray = number(&photo["stray_light"]);
+        assert!((stray - 0.01 * l as f64 / 60.0).abs() < 1e-3, "{photo}");
+        number(&photo["gain"]) / gain(l)
+    });
+    let ratios: Vec<f64> = ratios.collect();
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    for ratio in &ratios {
+        assert!((ratio / mean - 1.0).abs() < 0.006, "{ratio} of {mean}");
+    }
+    let loss = number(&clean["expected_snr_db"]) - number(&report["expected_snr_db"]);
+    assert!(loss.abs() < 0.5, "{loss} dB");
+}
+
+#[test]
+fn a_photograph_that_does_not_belong_is_left_out_by_name() {
+    let capture = Capture::new();
+    let other = capture.read(21);
+    let samples: Vec<f64> = other
+        .iter()
+        .map(|y| (f64::from(*y) - BLACK) / (WHITE - BLACK))
+        .collect();
+    capture.change(20, |i, y| 0.5 * (y + samples[i]));
+    let (report, errors) = capture.report();
+    for word in [
+        "warning: shots[20] (photos/0020.png) is left out",
+        "50 % of patterns/0021.png",
+    ] {
+        assert!(errors.contains(word), "no {word}: {errors}");
+    }
+    assert_eq!(report["warnings"][0]["code"], "photograph-blend");
+    let table = report["photograph_table"].as_array().unwrap();
+    let verdict = |shot: u64| {
+        let photo = table.iter().find(|photo| photo["shot"] == shot).unwrap();
+        photo["verdict"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(verdict(20), "photograph-blend");
+    assert_eq!(verdict(21), "used");
+
+    std::fs::remove_file(capture.output()).unwrap();
+    let strict = capture.recover(&["--strict"]);
+    assert_eq!(strict.status.code(), Some(65));
+    let errors = String::from_utf8(strict.stderr).unwrap();
+    assert!(errors.contains("--strict allows no warning"), "{errors}");
+    assert!(!capture.output().exists());
+}
+
+#[test]
+fn swapped_photographs_are_left_out_with_the_patterns_that_they_show() {
+    let capture = Capture::new();
+    let photos = [3, 5].map(|l| capture.read(l));
+    photos[0].save(capture.photo(5)).unwrap();
+    photos[1].save(capture.photo(3)).unwrap();
+    let (report, errors) = capture.report();
+    for (l, other) in [(3, 5), (5, 3)] {
+        let warning = format!(
+            "shots[{l}] (photos/{l:04}.png) is left out: it shows the pattern patterns/{other:04}.png of \
+             shots[{other}]"
+        );
+        assert!(errors.contains(&warning), "no {warning}: {errors}");
+    }
+    assert_eq!(report["warnings"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn photographs_that_follow_from_nothing_are_written_by_force_only() {
+    let capture = Capture::new();
+    // From the middle of the session on, the camera looks half a picture to the right.
+    for l in 30..60 {
+        let photo = capture.read(l);
+        let width = photo.width();
+        let moved = Photograph::from_fn(width, photo.height(), |x, y| {
+            *photo.get_pixel((x + width / 2) % width, y)
+        });
+        moved.save(capture.photo(l)).unwrap();
+    }
+    let output = capture.recover(&[]);
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(!capture.output().exists(), "{errors}");
+}
