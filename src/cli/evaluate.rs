@@ -46,6 +46,10 @@ struct EvaluateReport {
     /// The same by camera channel.
     heldout_rgb_snr_db: [Option<Decibels>; CHANNELS],
     heldout_shots: usize,
+    /// SNR of predicted pictures against these photographs, each with an exposure and stray light of its own.
+    heldout_fitted_snr_db: Option<Decibels>,
+    /// One for each of these photographs.
+    heldout_table: Vec<HeldOutPhotograph>,
     /// SNR of the predicted picture against the flood photograph, which the recovery does not use; null without one.
     flood_snr_db: Option<Decibels>,
     file_bytes: u64,
@@ -54,6 +58,23 @@ struct EvaluateReport {
     read_scans: usize,
     scans: usize,
 }
+
+/// A photograph that the recovery did not use.
+#[derive(Serialize)]
+struct HeldOutPhotograph {
+    /// Index in `shots`.
+    shot: usize,
+    photo: String,
+    /// Exposure relative to the prediction.
+    gain: f64,
+    /// Light that the prediction lacks everywhere, as a share of white.
+    stray_light: f64,
+    snr_db: Option<Decibels>,
+    fitted_snr_db: Option<Decibels>,
+}
+
+/// SNR on held-out photographs below which they are not of the file's object.
+const MIN_SAME_OBJECT_SNR: Decibels = Decibels(3.0);
 
 pub fn run(args: &EvaluateArgs) -> Result<()> {
     let file = read_ltm(&args.file, args.first)?;
@@ -126,13 +147,47 @@ impl EvaluateReport {
         let plane = relighter.transport().geometry.light;
         let dark = folder.read_dark()?;
         let mut errors = [SnrAccumulator::default(); CHANNELS];
+        let mut fitted_errors = SnrAccumulator::default();
         for i in (0..folder.manifest().shots.len()).filter(|i| !used.contains(i)) {
             let light = Light::from_linear_rgb(plane, &folder.read_pattern(i)?.rgb())?;
-            add_error(&mut errors, relighter, &light, folder.open_shot(i, &dark)?)?;
-            self.heldout_shots += 1;
+            let mut of_photo = [SnrAccumulator::default(); CHANNELS];
+            let samples = add_error(
+                &mut of_photo,
+                relighter,
+                &light,
+                folder.open_shot(i, &dark)?,
+            )?;
+            let (gain, stray_light) = fit_line(&samples);
+            let mut fitted = SnrAccumulator::default();
+            for [predicted, measured] in &samples {
+                fitted.add(*measured, gain * predicted + stray_light);
+            }
+            self.heldout_table.push(HeldOutPhotograph {
+                shot: i,
+                photo: folder.manifest().shots[i].photo.clone(),
+                gain,
+                stray_light,
+                snr_db: of_photo.into_iter().sum::<SnrAccumulator>().snr(),
+                fitted_snr_db: fitted.snr(),
+            });
+            for (sum, error) in errors.iter_mut().zip(of_photo) {
+                *sum = [*sum, error].into_iter().sum();
+            }
+            fitted_errors = [fitted_errors, fitted].into_iter().sum();
         }
+        self.heldout_shots = self.heldout_table.len();
         self.heldout_rgb_snr_db = errors.map(|e| e.snr());
         self.heldout_snr_db = errors.into_iter().sum::<SnrAccumulator>().snr();
+        self.heldout_fitted_snr_db = fitted_errors.snr();
+        if self
+            .heldout_fitted_snr_db
+            .is_some_and(|snr| snr < MIN_SAME_OBJECT_SNR)
+        {
+            eprintln!(
+                "warning: the file predicts none of the photographs: is it of another object, or has the camera \
+                 moved since?"
+            );
+        }
         if let Some(photo) = folder.open_flood(&dark)? {
             let light = BuiltinLight::Flood.render(plane);
             let mut errors = [SnrAccumulator::default(); CHANNELS];
@@ -150,6 +205,7 @@ impl EvaluateReport {
         decibels("SNR of the transport", self.snr_db)?;
         let heldout = format!("SNR on {} held-out shots", self.heldout_shots);
         decibels(&heldout, self.heldout_snr_db)?;
+        decibels("  with exposures fitted", self.heldout_fitted_snr_db)?;
         decibels("SNR on the flood photograph", self.flood_snr_db)?;
         for (name, psnr) in &self.relit {
             decibels(&format!("PSNR relit under {name}"), *psnr)?;
@@ -162,22 +218,44 @@ impl EvaluateReport {
     }
 }
 
-/// Adds the error of the picture predicted under `light`, without saturated samples.
+/// Gain and offset of the line from predicted to measured samples, by least squares.
+fn fit_line(samples: &[[f64; 2]]) -> (f64, f64) {
+    let count = samples.len() as f64;
+    let mean = |i: usize| samples.iter().map(|sample| sample[i]).sum::<f64>() / count;
+    let means = [mean(0), mean(1)];
+    let product = |i: usize| {
+        let terms = samples
+            .iter()
+            .map(|sample| (sample[0] - means[0]) * (sample[i] - means[i]));
+        terms.sum::<f64>()
+    };
+    let gain = product(1) / product(0);
+    match gain.is_finite() {
+        true => (gain, means[1] - gain * means[0]),
+        false => (1.0, 0.0),
+    }
+}
+
+/// Adds the error of the picture predicted under `light`, without saturated samples. Returns predicted and measured
+/// samples.
 fn add_error(
     errors: &mut [SnrAccumulator; CHANNELS],
     relighter: &mut CpuRelighter,
     light: &Light,
     reader: PhotographRowReader,
-) -> Result<()> {
+) -> Result<Vec<[f64; 2]>> {
     relighter.relight(light, &AllCoresExecutor);
     let picture = relighter.linear();
     let (photo, _) = reader.read_all()?;
+    let mut samples = Vec::new();
     for (predicted, measured) in picture.pixels.iter().zip(&photo) {
         for c in 0..CHANNELS {
             if measured[c].is_finite() {
-                errors[c].add(f64::from(measured[c]), f64::from(predicted[c]));
+                let sample = [f64::from(predicted[c]), f64::from(measured[c])];
+                errors[c].add(sample[1], sample[0]);
+                samples.push(sample);
             }
         }
     }
-    Ok(())
+    Ok(samples)
 }

@@ -73,7 +73,7 @@ impl MemoryPlan {
         let photographs = shots as u64;
         let width = u64::from(camera.width);
         let fixed_bytes = PROGRAM_BYTES
-            + method.preparation_bytes(window) as u64
+            + method.preparation_bytes(window, shots) as u64
             + PIXEL_BYTES * camera.area() as u64 // the dark frame
             + PIXEL_BYTES * (shots * light.area()) as u64 // patterns, of any colour
             + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width);

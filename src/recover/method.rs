@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::bpdn::SparsityBasis;
 use super::learned;
 use super::mean_function;
+use super::photometry;
 use super::pixelwise::PixelwiseRecovery;
 use crate::transport::Window;
 
@@ -40,10 +41,13 @@ impl Method {
         }
     }
 
-    /// Upper bound on the memory that preparing a recovery takes beside the measurements, in bytes.
-    pub fn preparation_bytes(self, window: Window) -> usize {
+    /// Upper bound on the memory that preparing a recovery from so many photographs takes beside the measurements, in
+    /// bytes.
+    pub fn preparation_bytes(self, window: Window, photographs: usize) -> usize {
         let learned = self.if_learned(learned::preparation_bytes(window));
-        learned.max(mean_function::max_bytes(window))
+        let shared =
+            mean_function::max_bytes(window).max(photometry::max_bytes(window, photographs));
+        learned.max(shared)
     }
 
     /// Upper bound on the memory that recovering a tile takes beside the measurements and the tile's functions, in

@@ -144,7 +144,7 @@ pub fn photographs(
                 format!("it shows the pattern {} of shots[{}]", shot(other).pattern, shots[other])
             }
             PhotographFault::Blend { other, share } => format!(
-                "it shows a blend of its pattern and {:.0} % of {}: was it taken while the display changed?",
+                "it shows a blend of its pattern and {:.0} % of {}: was it taken while the screen changed?",
                 100.0 * share,
                 shot(other).pattern
             ),

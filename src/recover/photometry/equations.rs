@@ -8,12 +8,13 @@
 //! The leak is the light from outside the window relative to brightness, nearly constant, the same for all pixels: it must
 //! not pass for stray light, which does not depend on brightness.
 
+use super::estimate::MAX_PHOTOGRAPHS;
 use super::window_covariance::{ScaledPixel, WindowCovariance};
 use crate::job_executor::{Cancelled, Executor, PARTS};
 use crate::linalg::{self, add_scaled, dot, vectorise};
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::sampling::{self, PixelsSharingWindow};
-use crate::transport::{LightElement, TileRect};
+use crate::transport::{LightElement, TileRect, Window};
 
 /// Weight of the constraint on the scales' mean, relative to the equations'.
 const GAUGE_WEIGHT: f64 = 1e3;
@@ -52,7 +53,7 @@ pub(super) async fn fit(
     let (executor, patterns) = (preparation.executor, pattern_indices.len());
     let share = |part: usize| part * squares.len() / PARTS;
     let sum_part = |part: usize| {
-        let mut sums = Sums::zeros(patterns);
+        let mut sums = CalibrationSums::zeros(patterns);
         for square in &squares[share(part)..share(part + 1)] {
             sums.scores
                 .resize(sums.scores.len() + unknowns(patterns), 0.0);
@@ -66,7 +67,7 @@ pub(super) async fn fit(
         sums.into_values()
     };
     let parts = executor.all_gather(PARTS, sum_part).await?;
-    let mut total = Sums::zeros(patterns);
+    let mut total = CalibrationSums::zeros(patterns);
     parts.iter().for_each(|part| total.add_values(part));
     Ok(total.solve())
 }
@@ -85,11 +86,20 @@ pub(super) fn for_largest_window(
     }
 }
 
-struct Sums {
+/// Upper bound on the memory that [`fit`] takes for so many photographs, in bytes: the sums of each part, those of all,
+/// and for each part the model of a window.
+pub(in crate::recover) fn max_bytes(window: Window, photographs: usize) -> usize {
+    let photographs = photographs.min(MAX_PHOTOGRAPHS);
+    let sums = (2 * PARTS + 2) * unknowns(photographs).pow(2);
+    let window = PARTS * photographs * (4 * photographs + 2 * window.area());
+    (sums + window) * size_of::<f64>()
+}
+
+struct CalibrationSums {
     patterns: usize,
     /// `[2L + 1, 2L + 1]`; of the blocks, upper and diagonal ones.
     hessian: Vec<f64>,
-    /// Sums of [`CorrectionStep::deviations`], `[L]`.
+    /// CalibrationSums of [`CorrectionStep::deviations`], `[L]`.
     deviations: Vec<f64>,
     /// Number of pixels and channels.
     count: f64,
@@ -103,7 +113,7 @@ fn unknowns(patterns: usize) -> usize {
     2 * patterns + 1
 }
 
-impl Sums {
+impl CalibrationSums {
     fn zeros(patterns: usize) -> Self {
         Self {
             patterns,
@@ -170,7 +180,7 @@ impl Sums {
             .chunks_exact(l)
             .map(|row| row.iter().sum())
             .collect();
-        // Sums over pixels of the products of the columns y, y/f, y·leak, 1/f², leak/f and leak².
+        // CalibrationSums over pixels of the products of the columns y, y/f, y·leak, 1/f², leak/f and leak².
         let mut products = vec![0.0; l * l];
         let (mut offset_sums, mut leak_sums) = (vec![0.0; l], vec![0.0; l]);
         let [mut offsets, mut leaks, mut offset_leaks] = [0.0; 3];

@@ -29,7 +29,7 @@ const MAX_OUTLIER_SHARE: f64 = 0.2;
 const MAX_UNEXPLAINED_SHARE: f64 = 0.5;
 /// Fewest squares that give standard errors, and most photographs whose equations fit in memory.
 const MIN_SQUARES: usize = 32;
-const MAX_PHOTOGRAPHS: usize = 512;
+pub(super) const MAX_PHOTOGRAPHS: usize = 512;
 /// Fewest photographs that predict one another.
 const MIN_PHOTOGRAPHS: usize = 3 * MIN_PATTERNS;
 /// Range of a correction's scale. A photograph of something else has none.

@@ -30,7 +30,7 @@ pub enum PhotographFault {
         /// The other photograph's index in the measurements.
         other: usize,
     },
-    /// It was taken while the display changed between two patterns.
+    /// It was taken while the screen changed between two patterns.
     Blend {
         /// Index of the photograph with the other pattern.
         other: usize,

@@ -21,6 +21,7 @@ mod window_covariance;
 
 pub(super) use calibrated_measurements::CalibratedMeasurements;
 pub use calibrated_measurements::LinearCorrection;
+pub(super) use equations::max_bytes;
 pub(super) use estimate::estimate;
 pub use faults::PhotographFault;
 
