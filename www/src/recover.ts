@@ -23,6 +23,7 @@ export type {
   GrayCodePhotograph,
   LinearPicture,
   PatternInput,
+  PhotographFaultCode,
   PhotographInput,
   PicturesInput,
   ProgressOptions,

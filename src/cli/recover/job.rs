@@ -24,7 +24,7 @@ use crate::recover::{MIN_PATTERNS, PreparedRecovery, RecoverError, TailEstimate}
 use crate::transport::{Basis, Decibels};
 
 /// SNR on held-out patterns below which hardly anything in a file would be right.
-const MIN_USABLE_SNR: Decibels = Decibels(1.0);
+const MIN_USABLE_SNR: Decibels = Decibels(2.0);
 
 /// The warnings printed so far.
 #[derive(Default)]

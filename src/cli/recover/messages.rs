@@ -141,7 +141,11 @@ pub fn photographs(
         let (index, own) = (shots[l], shot(l));
         let reason = match fault {
             PhotographFault::PatternOf { other } => {
-                format!("it shows the pattern {} of shots[{}]", shot(other).pattern, shots[other])
+                format!(
+                    "it shows the pattern {} of shots[{}]",
+                    shot(other).pattern,
+                    shots[other]
+                )
             }
             PhotographFault::Blend { other, share } => format!(
                 "it shows a blend of its pattern and {:.0} % of {}: was it taken while the screen changed?",
@@ -152,9 +156,14 @@ pub fn photographs(
                 "it shows neither {} nor any other pattern of this capture",
                 own.pattern
             ),
-            PhotographFault::OtherObject => "it does not show this object as the others do".to_owned(),
+            PhotographFault::OtherObject => {
+                "it does not show this object as the others do".to_owned()
+            }
+            PhotographFault::Moved { shift: [x, y] } => format!(
+                "the camera or the object had moved, by about {x:.1} pixels to the right and {y:.1} down"
+            ),
             PhotographFault::Distorted => {
-                "it differs from its prediction: did the camera or the object move, or did something cover it?"
+                "it differs from its prediction: is it blurred, or did something cover the object?"
                     .to_owned()
             }
         };
@@ -163,7 +172,27 @@ pub fn photographs(
             message: format!("shots[{index}] ({}) is left out: {reason}", own.photo),
         }
     };
-    recovery.faults().iter().map(warning).collect()
+    let is_moved = |fault: &PhotographFault| matches!(fault, PhotographFault::Moved { .. });
+    let (moved, others): (Vec<_>, Vec<_>) = recovery
+        .faults()
+        .iter()
+        .partition(|(_, fault)| is_moved(fault));
+    let mut warnings: Vec<Warning> = others.iter().map(warning).collect();
+    // Many photographs, and one cause.
+    if let Some((first, more)) = moved.split_first() {
+        let mut summary = warning(first);
+        if !more.is_empty() {
+            let names = moved.iter().map(|(l, _)| listed[shots[*l]].photo.clone());
+            summary.message = format!(
+                "{} photographs are left out, as the camera or the object had moved by more than a tenth of a \
+                 pixel: {}",
+                moved.len(),
+                join_first(names)
+            );
+        }
+        warnings.push(summary);
+    }
+    warnings
 }
 
 /// Notes exposures and stray light that are corrected.

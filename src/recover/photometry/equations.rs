@@ -1,10 +1,11 @@
-//! Generalised least squares for the corrections of all photographs.
+//! Generalised least squares for the corrections of all photographs, and for the shifts of the camera between them.
 //!
 //! A correction `s_l y_l + o_l` of small effect changes a pixel's scaled residual `r = y − m` by `D_y (s − 1) + o/f`, with
-//! `D_y = diag(y)`. The corrections minimise `Σ rᵀ K⁻¹ r` over sampled pixels and channels. The objective is quadratic:
+//! `D_y = diag(y)`; a shift d of the picture is undone by `(∂y/∂x) d_x + (∂y/∂y) d_y`, to first order. The corrections minimise `Σ rᵀ K⁻¹ r` over sampled pixels and channels. The objective is quadratic:
 //! one step leads to its minimum, but for the brightness f, which depends on the corrections.
 //!
-//! Unknowns are `[scales, offsets, leak]`, L scales and L offsets. The scales' mean is fixed, as brightness absorbs it.
+//! Unknowns are `[scales, shifts x, shifts y, offsets, leak]`, L of each but the leak. The means of scales and shifts are
+//! fixed, as brightness and functions absorb them.
 //! The leak is the light from outside the window relative to brightness, nearly constant, the same for all pixels: it must
 //! not pass for stray light, which does not depend on brightness.
 
@@ -16,7 +17,7 @@ use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::sampling::{self, PixelsSharingWindow};
 use crate::transport::{LightElement, TileRect, Window};
 
-/// Weight of the constraint on the scales' mean, relative to the equations'.
+/// Weight of the constraints on means, relative to the equations'.
 const GAUGE_WEIGHT: f64 = 1e3;
 /// Added to the mean squared deviation of a pixel's photographs, whose inverse weights the pixel: how far functions are
 /// from the mean function differs between parts of an object.
@@ -26,6 +27,10 @@ const RIDGE: f64 = 1e-8;
 
 /// The corrections that improve the fit most, and how well the photographs fit without them.
 pub(super) struct CorrectionStep {
+    /// Shift of each photograph's picture, in camera pixels, relative to their mean, `[2][L]`.
+    pub shifts: [Vec<f64>; 2],
+    /// Standard errors of the same.
+    pub shift_errors: [Vec<f64>; 2],
     /// Change of each photograph's scale and offset, `[2][L]`.
     pub steps: [Vec<f64>; 2],
     /// Standard errors of the same.
@@ -97,20 +102,23 @@ pub(in crate::recover) fn max_bytes(window: Window, photographs: usize) -> usize
 
 struct CalibrationSums {
     patterns: usize,
-    /// `[2L + 1, 2L + 1]`; of the blocks, upper and diagonal ones.
+    /// `[4L + 1, 4L + 1]`; of the blocks, upper and diagonal ones.
     hessian: Vec<f64>,
-    /// CalibrationSums of [`CorrectionStep::deviations`], `[L]`.
+    /// Sums of [`CorrectionStep::deviations`], `[L]`.
     deviations: Vec<f64>,
     /// Number of pixels and channels.
     count: f64,
     /// Energies of leave-one-out residuals and of differences between photographs.
     energies: [f64; 2],
-    /// Negative gradient of each square, `[square, 2L + 1]`.
+    /// Negative gradient of each square, `[square, 4L + 1]`.
     scores: Vec<f64>,
 }
 
+/// Kinds of unknowns whose columns differ from photograph to photograph: scales and shifts.
+const VARYING: usize = 3;
+
 fn unknowns(patterns: usize) -> usize {
-    2 * patterns + 1
+    (VARYING + 1) * patterns + 1
 }
 
 impl CalibrationSums {
@@ -180,9 +188,9 @@ impl CalibrationSums {
             .chunks_exact(l)
             .map(|row| row.iter().sum())
             .collect();
-        // CalibrationSums over pixels of the products of the columns y, y/f, y·leak, 1/f², leak/f and leak².
-        let mut products = vec![0.0; l * l];
-        let (mut offset_sums, mut leak_sums) = (vec![0.0; l], vec![0.0; l]);
+        // Sums over pixels of products: between varying columns; of these with 1/f and with the leak; and of the latter two.
+        let mut products = vec![0.0; VARYING * VARYING * l * l];
+        let (mut offset_sums, mut leak_sums) = (vec![0.0; VARYING * l], vec![0.0; VARYING * l]);
         let [mut offsets, mut leaks, mut offset_leaks] = [0.0; 3];
         let mut solved = vec![0.0; l];
         for pixel in pixels {
@@ -191,41 +199,56 @@ impl CalibrationSums {
             let mean = (0..l).map(deviation).sum::<f64>() / l as f64;
             let weight = 1.0 / (mean + MIN_DEVIATION);
             let mean = pixel.y.iter().sum::<f64>() / l as f64;
+            let [right, down] = &pixel.gradients;
+            let columns = [&pixel.y, right, down];
             for i in 0..l {
-                score[i] -= weight * pixel.y[i] * solved[i];
-                score[l + i] -= weight * pixel.unit * solved[i];
                 self.deviations[i] += weight * deviation(i);
                 let left_out = solved[i] / window.inverse[i * l + i];
                 self.energies[0] += weight * left_out * left_out;
                 self.energies[1] += weight * (pixel.y[i] - mean).powi(2);
-                let products = &mut products[i * l..(i + 1) * l];
-                add_scaled(products, weight * pixel.y[i], &pixel.y);
+                score[VARYING * l + i] -= weight * pixel.unit * solved[i];
             }
-            score[2 * l] -= weight * pixel.certainty * solved.iter().sum::<f64>();
-            add_scaled(&mut offset_sums, weight * pixel.unit, &pixel.y);
-            add_scaled(&mut leak_sums, weight * pixel.certainty, &pixel.y);
+            for (a, column) in columns.iter().enumerate() {
+                for i in 0..l {
+                    score[a * l + i] -= weight * column[i] * solved[i];
+                }
+                for b in a..VARYING {
+                    let block = &mut products[(a * VARYING + b) * l * l..][..l * l];
+                    for (row, value) in block.chunks_exact_mut(l).zip(*column) {
+                        add_scaled(row, weight * value, columns[b]);
+                    }
+                }
+                let range = a * l..(a + 1) * l;
+                add_scaled(&mut offset_sums[range.clone()], weight * pixel.unit, column);
+                add_scaled(&mut leak_sums[range], weight * pixel.certainty, column);
+            }
+            score[n - 1] -= weight * pixel.certainty * solved.iter().sum::<f64>();
             offsets += weight * pixel.unit * pixel.unit;
             offset_leaks += weight * pixel.unit * pixel.certainty;
             leaks += weight * pixel.certainty * pixel.certainty;
         }
         self.count += pixels.len() as f64;
-        let (scale_rows, rows) = self.hessian.split_at_mut(n * l);
-        let (offset_rows, leak_row) = rows.split_at_mut(n * l);
-        for (i, row) in scale_rows.chunks_exact_mut(n).enumerate() {
+        let (rows, leak_row) = self.hessian.split_at_mut(n * (n - 1));
+        for (k, row) in rows.chunks_exact_mut(n).enumerate() {
+            let (a, i) = (k / l, k % l);
             let inverse = &window.inverse[i * l..(i + 1) * l];
-            linalg::add_products(&mut row[..l], inverse, &products[i * l..(i + 1) * l]);
-            add_scaled(&mut row[l..2 * l], offset_sums[i], inverse);
-            row[2 * l] += leak_sums[i] * leak[i];
-        }
-        for (i, row) in offset_rows.chunks_exact_mut(n).enumerate() {
+            if a == VARYING {
+                add_scaled(&mut row[a * l..(a + 1) * l], offsets, inverse);
+                row[n - 1] += offset_leaks * leak[i];
+                continue;
+            }
+            for b in a..VARYING {
+                let products = &products[((a * VARYING + b) * l + i) * l..][..l];
+                linalg::add_products(&mut row[b * l..(b + 1) * l], inverse, products);
+            }
             add_scaled(
-                &mut row[l..2 * l],
-                offsets,
-                &window.inverse[i * l..(i + 1) * l],
+                &mut row[VARYING * l..(VARYING + 1) * l],
+                offset_sums[k],
+                inverse,
             );
-            row[2 * l] += offset_leaks * leak[i];
+            row[n - 1] += leak_sums[k] * leak[i];
         }
-        leak_row[2 * l] += leaks * leak.iter().sum::<f64>();
+        leak_row[n - 1] += leaks * leak.iter().sum::<f64>();
     }
 
     fn solve(&self) -> Option<CorrectionStep> {
@@ -246,10 +269,14 @@ impl CalibrationSums {
             }
             matrix[i * n + i] += RIDGE;
         }
-        let norm: f64 = scale[..l].iter().map(|s| s * s).sum();
-        for i in 0..l {
-            let factor = GAUGE_WEIGHT * scale[i] / norm;
-            add_scaled(&mut matrix[i * n + i..i * n + l], factor, &scale[i..l]);
+        for a in 0..VARYING {
+            let range = a * l..(a + 1) * l;
+            let norm: f64 = scale[range.clone()].iter().map(|s| s * s).sum();
+            for i in range.clone() {
+                let factor = GAUGE_WEIGHT * scale[i] / norm;
+                let row = &mut matrix[i * n + i..i * n + range.end];
+                add_scaled(row, factor, &scale[i..range.end]);
+            }
         }
         linalg::cholesky(&mut matrix, n)?;
         let solve = |score: &[f64]| -> Vec<f64> {
@@ -268,15 +295,19 @@ impl CalibrationSums {
             let mut deviation = share.clone();
             add_scaled(&mut deviation, -1.0 / shares.len() as f64, &step);
             linalg::add_products(&mut variances, &deviation, &deviation);
-            let mean = deviation[l..2 * l].iter().sum::<f64>() / l as f64;
+            let offsets = &deviation[VARYING * l..(VARYING + 1) * l];
+            let mean = offsets.iter().sum::<f64>() / l as f64;
             mean_offset_variance += mean * mean;
         }
         let errors: Vec<f64> = variances.iter().map(|variance| variance.sqrt()).collect();
         let deviations = self.deviations.iter().map(|d| d / self.count);
-        let halves = |values: &[f64]| [values[..l].to_vec(), values[l..2 * l].to_vec()];
+        let parts =
+            |values: &[f64], kinds: [usize; 2]| kinds.map(|a| values[a * l..(a + 1) * l].to_vec());
         (self.count > 0.0).then(|| CorrectionStep {
-            steps: halves(&step),
-            errors: halves(&errors),
+            steps: parts(&step, [0, VARYING]),
+            errors: parts(&errors, [0, VARYING]),
+            shifts: parts(&step, [1, 2]),
+            shift_errors: parts(&errors, [1, 2]),
             mean_offset_error: mean_offset_variance.sqrt(),
             unexplained_share: self.energies[0] / self.energies[1],
             deviations: deviations.collect(),

@@ -4,7 +4,7 @@
 //! capture takes one step, which finds nothing significant.
 
 use super::equations::{self, CorrectionStep};
-use super::{CalibratedMeasurements, LinearCorrection, Photometry, faults};
+use super::{CalibratedMeasurements, LinearCorrection, PhotographFault, Photometry, faults};
 use crate::job_executor::{Cancelled, Executor};
 use crate::linalg;
 use crate::recover::mean_function;
@@ -24,12 +24,21 @@ const OUTLIER_RATIO: f64 = 3.0;
 const WORST_SHARE: f64 = 0.3;
 /// Largest share of the photographs that may be left out.
 const MAX_OUTLIER_SHARE: f64 = 0.2;
+/// Shift in camera pixels that does harm, and the standard errors by which it must be larger. Where standard errors are
+/// large, functions differ too much from the model to tell.
+const MIN_SHIFT: f64 = 0.1;
+const SHIFT_ERRORS: f64 = 3.0;
+const MAX_SHIFT_ERROR: f64 = 0.05;
+/// Median shift of the other photographs, in camera pixels, up to which the camera stood still.
+const MAX_TREMOR: f64 = 0.06;
+/// Largest share of the photographs that may be left out because the camera moved.
+const MAX_MOVED_SHARE: f64 = 0.6;
 /// Share of the differences between photographs that may be unexplained. Otherwise these are not photographs of their
 /// patterns, which is told later.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.5;
 /// Fewest squares that give standard errors, and most photographs whose equations fit in memory.
 const MIN_SQUARES: usize = 32;
-pub(super) const MAX_PHOTOGRAPHS: usize = 512;
+pub(super) const MAX_PHOTOGRAPHS: usize = 256;
 /// Fewest photographs that predict one another.
 const MIN_PHOTOGRAPHS: usize = 3 * MIN_PATTERNS;
 /// Range of a correction's scale. A photograph of something else has none.
@@ -56,6 +65,7 @@ pub(in crate::recover) async fn estimate(
     let mut corrections = vec![LinearCorrection::IDENTITY; count];
     let mut used: Vec<usize> = (0..count).collect();
     let mut outliers: Vec<usize> = Vec::new();
+    let mut moved: Vec<(usize, PhotographFault)> = Vec::new();
     let max_outliers = (MAX_OUTLIER_SHARE * count as f64) as usize;
     let mut steps = 0;
     let last = loop {
@@ -71,34 +81,46 @@ pub(in crate::recover) async fn estimate(
             step.apply(&used, &mut corrections);
             continue;
         }
-        let found = step.outliers();
-        if found.is_empty() {
+        let (mut found, shifted) = (step.outliers(), step.shifted());
+        // After a bump, an outlier from the other place is no other object.
+        let is_bump = found.is_empty() || !moved.is_empty();
+        if is_bump && shifted.len() as f64 <= MAX_MOVED_SHARE * used.len() as f64 {
+            found.retain(|i| shifted.iter().all(|(other, _)| other != i));
+            let faults = shifted.iter();
+            moved.extend(faults.map(|&(i, shift)| (used[i], PhotographFault::Moved { shift })));
+        }
+        let is_left_out = |l: &usize| moved.iter().any(|(other, _)| other == l);
+        if found.is_empty() && !used.iter().any(is_left_out) {
             break step;
         }
         if outliers.len() + found.len() > max_outliers {
             return Ok(Photometry::default());
         }
         outliers.extend(found.iter().map(|&i| used[i]));
-        used.retain(|l| !outliers.contains(l));
+        used.retain(|l| !outliers.contains(l) && !is_left_out(l));
         steps = 0;
     };
     // NaN where photographs do not differ at all.
     if last.unexplained_share.is_nan() || last.unexplained_share > MAX_UNEXPLAINED_SHARE {
         return Ok(Photometry::default());
     }
-    for &l in &outliers {
-        corrections[l] = LinearCorrection::IDENTITY;
+    for l in 0..count {
+        if !used.contains(&l) {
+            corrections[l] = LinearCorrection::IDENTITY;
+        }
     }
     last.keep_significant(&used, &mut corrections);
     if corrections.iter().all(|c| *c == LinearCorrection::IDENTITY) {
         corrections.clear();
     }
-    let outliers: Vec<usize> = (0..count).filter(|l| !used.contains(l)).collect();
     let calibrated = CalibratedMeasurements::new(measurements, &corrections);
     let preparation = preparation.with(&calibrated);
     let faults = faults::classify(&preparation, &mean_function, &squares, &used, &outliers);
+    let mut faults = faults.await?;
+    faults.extend(moved);
+    let order = linalg::ascending_order(faults.iter().map(|fault| fault.0 as f64));
     Ok(Photometry {
-        faults: faults.await?,
+        faults: order.into_iter().map(|i| faults[i]).collect(),
         corrections,
     })
 }
@@ -132,6 +154,32 @@ impl CorrectionStep {
         let deviations = self.deviations.iter().enumerate();
         let outliers = deviations.filter(|(_, deviation)| **deviation > limit);
         outliers.map(|(i, _)| i).collect()
+    }
+
+    /// Photographs whose picture is shifted, by their positions, with the shift. The camera's place is that in the first half
+    /// of the session: the Gray code comes before it. None if the others are not steady either: nothing is won without
+    /// the worst.
+    fn shifted(&self) -> Vec<(usize, [f64; 2])> {
+        let first_half = self.shifts[0].len().div_ceil(2);
+        let place = [0, 1].map(|axis| median(&self.shifts[axis][..first_half]));
+        let shift = |i: usize| [0, 1].map(|axis| self.shifts[axis][i] - place[axis]);
+        let is_shifted = |&(i, shift): &(usize, [f64; 2])| {
+            (0..2).any(|axis| {
+                let error = self.shift_errors[axis][i];
+                error < MAX_SHIFT_ERROR && shift[axis].abs() > MIN_SHIFT + SHIFT_ERRORS * error
+            })
+        };
+        let all = (0..self.shifts[0].len()).map(|i| (i, shift(i)));
+        let (shifted, steady): (Vec<_>, Vec<_>) = all.partition(is_shifted);
+        if steady.is_empty() {
+            return Vec::new();
+        }
+        let distances = steady.iter().map(|(_, [x, y])| (x * x + y * y).sqrt());
+        let deviation = median(&distances.collect::<Vec<f64>>());
+        match deviation < MAX_TREMOR {
+            true => shifted,
+            false => Vec::new(),
+        }
     }
 
     /// Shrinks the corrections of the photographs `used` towards none, by the variance that exceeds their standard errors

@@ -41,7 +41,12 @@ pub enum PhotographFault {
     UnknownPattern,
     /// It shows something else.
     OtherObject,
-    /// It shows its pattern and object, but not as the others do: moved, blurred, or covered in part.
+    /// The camera or the object had moved.
+    Moved {
+        /// The picture's shift in camera pixels, to the right and down. Shifts above a pixel are underestimated.
+        shift: [f64; 2],
+    },
+    /// It shows its pattern and object, but not as the others do: blurred, or covered in part.
     Distorted,
 }
 
@@ -53,6 +58,7 @@ impl PhotographFault {
             Self::Blend { .. } => "photograph-blend",
             Self::UnknownPattern => "photograph-unknown-pattern",
             Self::OtherObject => "photograph-object",
+            Self::Moved { .. } => "photograph-moved",
             Self::Distorted => "photograph-distorted",
         }
     }

@@ -7,7 +7,7 @@
 use super::CalibratedMeasurements;
 use crate::linalg::{self, dot};
 use crate::recover::sampling::PixelsSharingWindow;
-use crate::transport::{Geometry, LightElement};
+use crate::transport::{CameraPixel, Geometry, LightElement};
 
 /// Variance of a function's elements as a share of h²: four times that of the learned prior's start, whose neighbouring
 /// elements vary together.
@@ -36,6 +36,8 @@ pub(super) struct ScaledPixel {
     pub unit: f64,
     /// The square root of the certainty, 1 without noise.
     pub certainty: f64,
+    /// Differences of `y` per camera pixel to the right and down, `[2][L]`; zero where a neighbour is not measured.
+    pub gradients: [Vec<f64>; 2],
 }
 
 impl ScaledPixel {
@@ -137,9 +139,39 @@ impl WindowCovariance {
             let certainty = (MODEL_VARIANCE / (MODEL_VARIANCE + noise)).sqrt();
             let unit = certainty / brightness;
             y.iter_mut().for_each(|y| *y *= unit);
-            Some(ScaledPixel { y, unit, certainty })
+            let gradients = [(1, 0), (0, 1)].map(|step| {
+                let gradient = |&l: &usize| unit * gradient(measurements, l, pixel, c, step);
+                pattern_indices.iter().map(gradient).collect()
+            });
+            Some(ScaledPixel {
+                y,
+                unit,
+                certainty,
+                gradients,
+            })
         };
         channels.filter_map(scale).collect()
+    }
+}
+
+/// Half the difference of the samples of a photograph beside a pixel, along `(x, y)`; zero if one is not measured.
+fn gradient(
+    measurements: &CalibratedMeasurements<'_>,
+    l: usize,
+    CameraPixel { x, y }: CameraPixel,
+    c: usize,
+    (dx, dy): (u32, u32),
+) -> f64 {
+    let camera = measurements.camera;
+    if x < dx || y < dy || x + dx >= camera.width || y + dy >= camera.height {
+        return 0.0;
+    }
+    let sample = |x: u32, y: u32| measurements.sample(l, CameraPixel { x, y }, c);
+    let difference = sample(x + dx, y + dy) - sample(x - dx, y - dy);
+    if difference.is_nan() {
+        0.0
+    } else {
+        0.5 * difference
     }
 }
 

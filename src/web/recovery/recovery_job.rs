@@ -1,6 +1,7 @@
 //! One recovery: from measurements to a file.
 
 use std::io::{self, ErrorKind};
+use std::mem;
 
 use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -12,7 +13,8 @@ use crate::export::{
     self, FileQuality, MIN_PLAUSIBLE_SNR, PreparedExport, Provenance, has_implausible_saturation,
 };
 use crate::recover::{
-    MIN_PATTERNS, Method, PreparedRecovery, RecoverError, SparsityBasis, TailEstimate,
+    MIN_PATTERNS, Method, PhotographFault, PreparedRecovery, RecoverError, SparsityBasis,
+    TailEstimate,
 };
 use crate::transport::{Basis, Decibels, Window};
 use crate::web::CodedError;
@@ -225,7 +227,10 @@ impl Recovery {
         self.overexposed_pixels
     }
 
-    /// Codes of doubts: `low-snr`, `band-unbounded`, `band-undetermined`, `saturation` and `overexposed`.
+    /// Codes of doubts: `low-snr`, `band-unbounded`, `band-undetermined`, `saturation` and `overexposed`; then one for each
+    /// photograph that is left out, with the index of its shot: `photograph-unknown-pattern 3`, `photograph-object 3`,
+    /// `photograph-distorted 3`, `photograph-pattern 3 7` (it shows the pattern of shot 7), and `photograph-blend 3 7 50`
+    /// (50 % of the light is that pattern's); one for all that are moved, `photograph-moved 3 20` (shot 3 and 19 others).
     #[wasm_bindgen(getter)]
     pub fn warnings(&self) -> Vec<String> {
         let is_low = |snr: Decibels| snr < MIN_PLAUSIBLE_SNR;
@@ -244,7 +249,17 @@ impl Recovery {
             (self.overexposed_pixels > 0, "overexposed"),
         ];
         let given = warnings.into_iter().filter(|(applies, _)| *applies);
-        given.map(|(_, name)| name.to_owned()).collect()
+        let doubts = given.map(|(_, name)| name.to_owned());
+        let faults = self.recovery().faults();
+        let shots = &self.input.provenance.shots;
+        let is_moved = |fault: &PhotographFault| matches!(fault, PhotographFault::Moved { .. });
+        let moved = faults.iter().filter(|(_, fault)| is_moved(fault)).count();
+        let mut is_first = true;
+        let warnings = faults.iter().filter_map(|&(l, fault)| {
+            let is_repeated = is_moved(&fault) && !mem::take(&mut is_first);
+            (!is_repeated).then(|| fault_warning(shots, l, fault, moved))
+        });
+        doubts.chain(warnings).collect()
     }
 }
 
@@ -299,6 +314,21 @@ fn parse_method(method: &str, basis: Option<&str>) -> Result<Method, CodedError>
         ("bpdn", basis) => return Err(invalid("basis", basis, "identity, dct or haar")),
         (method, _) => return Err(invalid("method", method, "learned, nnls or bpdn")),
     })
+}
+
+/// The warning of photograph `l`'s fault; `moved` photographs are left out because the camera moved.
+fn fault_warning(shots: &[usize], l: usize, fault: PhotographFault, moved: usize) -> String {
+    let shot = |l: usize| shots.get(l).copied().unwrap_or(l);
+    let (code, own) = (fault.code(), shot(l));
+    match fault {
+        PhotographFault::PatternOf { other } => format!("{code} {own} {}", shot(other)),
+        PhotographFault::Blend { other, share } => {
+            let percent = (100.0 * share).round() as u32;
+            format!("{code} {own} {} {percent}", shot(other))
+        }
+        PhotographFault::Moved { .. } => format!("{code} {own} {moved}"),
+        _ => format!("{code} {own}"),
+    }
 }
 
 /// The error, with the shots that it is about.

@@ -72,6 +72,7 @@ export interface RecoverySummary {
   readonly lightHeight: number;
   readonly saturatedSamples: number;
   readonly overexposedPixels: number;
+  /** Codes, some with numbers after them, separated by spaces: shots, and a percentage. */
   readonly warnings: readonly string[];
 }
 

@@ -138,7 +138,17 @@ export type RecoveryWarningCode =
   | 'band-undetermined'
   | 'saturation'
   | 'overexposed'
-  | 'unknown-fields';
+  | 'unknown-fields'
+  | PhotographFaultCode;
+
+/** Why a photograph is left out. */
+export type PhotographFaultCode =
+  | 'photograph-pattern'
+  | 'photograph-blend'
+  | 'photograph-unknown-pattern'
+  | 'photograph-object'
+  | 'photograph-moved'
+  | 'photograph-distorted';
 
 export interface EvaluationPair {
   readonly light: PatternInput;

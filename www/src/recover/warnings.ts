@@ -1,7 +1,7 @@
 /** Messages of the doubts about a recovery, as the command line's. */
 
 import type { InputSummary, PreparationSummary, RecoverySummary } from './protocol.js';
-import type { RecoveryWarning, RecoveryWarningCode } from './types.js';
+import type { PhotographFaultCode, RecoveryWarning, RecoveryWarningCode } from './types.js';
 
 export function describeWarnings(
   { width, height, shotsUsed, unknownFields }: InputSummary,
@@ -11,7 +11,7 @@ export function describeWarnings(
   const samples = 3 * width * height * shotsUsed.length;
   const percent = ((100 * saturatedSamples) / samples).toFixed(1);
   const side = `${window}x${window} light elements`;
-  const messages: Record<RecoveryWarningCode, string> = {
+  const messages: Record<Exclude<RecoveryWarningCode, PhotographFaultCode>, string> = {
     'low-snr':
       `The SNR on held-out patterns is only ${expectedSnr.toFixed(1)} dB. Check that the photographs are linear, that ` +
       'the light was steady and that the correspondence is right. With few patterns, or another method than learned, ' +
@@ -26,6 +26,30 @@ export function describeWarnings(
       'Photograph with less exposure, or add shots with less.',
     'unknown-fields': `Unknown fields of capture.json are ignored: ${unknownFields.join(', ')}.`,
   };
-  const codes = unknownFields.length > 0 ? ['unknown-fields', ...warnings] : warnings;
-  return (codes as RecoveryWarningCode[]).map((code) => ({ code, message: messages[code] }));
+  const given = unknownFields.length > 0 ? ['unknown-fields', ...warnings] : warnings;
+  return given.map((warning) => {
+    const [code, ...numbers] = warning.split(' ') as [RecoveryWarningCode, ...string[]];
+    return { code, message: { ...messages, ...faultMessages(numbers) }[code] };
+  });
+}
+
+/**
+ * Messages of a photograph that is left out: of a shot, another shot (or the number of moved photographs), and a
+ * percentage.
+ */
+function faultMessages([shot, other, percent]: string[]): Record<PhotographFaultCode, string> {
+  const leftOut = `shots[${shot}] is left out: it`;
+  const shows = `${leftOut} shows`;
+  return {
+    'photograph-pattern': `${shows} the pattern of shots[${other}].`,
+    'photograph-blend': `${shows} a blend of its pattern and ${percent} % of the pattern of shots[${other}]. Was it taken while the screen changed?`,
+    'photograph-unknown-pattern': `${shows} neither its pattern nor any other pattern of this capture.`,
+    'photograph-object': `${leftOut} does not show this object as the others do.`,
+    'photograph-moved':
+      (other === '1'
+        ? `shots[${shot}] is left out`
+        : `shots[${shot}] and ${Number(other) - 1} more are left out`) +
+      ': the camera or the object had moved by more than a tenth of a pixel.',
+    'photograph-distorted': `${leftOut} differs from its prediction. Is it blurred, or did something cover the object?`,
+  };
 }
