@@ -68,7 +68,12 @@ impl Capture {
             .arg("-o")
             .arg(self.output());
         command
-            .args(["--method", "nnls", "--json"])
+            .args(["--json"])
+            .args(if more.contains(&"--method") {
+                &[][..]
+            } else {
+                &["--method", "nnls"]
+            })
             .args(more)
             .output()
             .unwrap()
@@ -207,17 +212,24 @@ fn photographs_after_a_bump_are_left_out() {
 #[test]
 fn photographs_that_follow_from_nothing_are_written_by_force_only() {
     let capture = Capture::new();
-    // From the middle of the session on, the camera looks half a picture to the right.
+    // From the middle of the session on, the picture is three pixels further up.
     for l in 30..60 {
         let photo = capture.read(l);
-        let width = photo.width();
-        let moved = Photograph::from_fn(width, photo.height(), |x, y| {
-            *photo.get_pixel((x + width / 2) % width, y)
+        let height = photo.height();
+        let moved = Photograph::from_fn(photo.width(), height, |x, y| {
+            *photo.get_pixel(x, (y + 3) % height)
         });
         moved.save(capture.photo(l)).unwrap();
     }
-    let output = capture.recover(&[]);
+    let output = capture.recover(&["--method", "learned"]);
     let errors = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(
+        errors.contains("--force writes the file nevertheless"),
+        "{errors}"
+    );
     assert!(!capture.output().exists(), "{errors}");
+    let forced = capture.recover(&["--method", "learned", "--force"]);
+    assert!(forced.status.success());
+    assert!(capture.output().exists());
 }

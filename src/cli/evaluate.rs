@@ -147,44 +147,42 @@ impl EvaluateReport {
         let plane = relighter.transport().geometry.light;
         let dark = folder.read_dark()?;
         let mut errors = [SnrAccumulator::default(); CHANNELS];
-        let mut fitted_errors = SnrAccumulator::default();
+        let mut fitted_energies = [0.0; 2];
         for i in (0..folder.manifest().shots.len()).filter(|i| !used.contains(i)) {
             let light = Light::from_linear_rgb(plane, &folder.read_pattern(i)?.rgb())?;
             let mut of_photo = [SnrAccumulator::default(); CHANNELS];
-            let samples = add_error(
+            let moments = add_error(
                 &mut of_photo,
                 relighter,
                 &light,
                 folder.open_shot(i, &dark)?,
             )?;
-            let (gain, stray_light) = fit_line(&samples);
-            let mut fitted = SnrAccumulator::default();
-            for [predicted, measured] in &samples {
-                fitted.add(*measured, gain * predicted + stray_light);
-            }
+            let (gain, stray_light) = moments.fit_line();
+            let fitted = moments.error_of_line(gain, stray_light);
             self.heldout_table.push(HeldOutPhotograph {
                 shot: i,
                 photo: folder.manifest().shots[i].photo.clone(),
                 gain,
                 stray_light,
                 snr_db: of_photo.into_iter().sum::<SnrAccumulator>().snr(),
-                fitted_snr_db: fitted.snr(),
+                fitted_snr_db: decibels_of([moments.measured_energy, fitted]),
             });
             for (sum, error) in errors.iter_mut().zip(of_photo) {
                 *sum = [*sum, error].into_iter().sum();
             }
-            fitted_errors = [fitted_errors, fitted].into_iter().sum();
+            fitted_energies[0] += moments.measured_energy;
+            fitted_energies[1] += fitted;
         }
         self.heldout_shots = self.heldout_table.len();
         self.heldout_rgb_snr_db = errors.map(|e| e.snr());
         self.heldout_snr_db = errors.into_iter().sum::<SnrAccumulator>().snr();
-        self.heldout_fitted_snr_db = fitted_errors.snr();
+        self.heldout_fitted_snr_db = decibels_of(fitted_energies);
         if self
             .heldout_fitted_snr_db
             .is_some_and(|snr| snr < MIN_SAME_OBJECT_SNR)
         {
             eprintln!(
-                "warning: the file predicts none of the photographs: is it of another object, or has the camera \
+                "warning: the file hardly predicts these photographs: is it of another object, or has the camera \
                  moved since?"
             );
         }
@@ -218,44 +216,72 @@ impl EvaluateReport {
     }
 }
 
-/// Gain and offset of the line from predicted to measured samples, by least squares.
-fn fit_line(samples: &[[f64; 2]]) -> (f64, f64) {
-    let count = samples.len() as f64;
-    let mean = |i: usize| samples.iter().map(|sample| sample[i]).sum::<f64>() / count;
-    let means = [mean(0), mean(1)];
-    let product = |i: usize| {
-        let terms = samples
-            .iter()
-            .map(|sample| (sample[0] - means[0]) * (sample[i] - means[i]));
-        terms.sum::<f64>()
-    };
-    let gain = product(1) / product(0);
-    match gain.is_finite() {
-        true => (gain, means[1] - gain * means[0]),
-        false => (1.0, 0.0),
+/// Sums over samples.
+#[derive(Default)]
+struct SampleMoments {
+    count: f64,
+    predicted: f64,
+    measured: f64,
+    predicted_energy: f64,
+    measured_energy: f64,
+    product: f64,
+}
+
+impl SampleMoments {
+    fn add(&mut self, predicted: f64, measured: f64) {
+        self.count += 1.0;
+        self.predicted += predicted;
+        self.measured += measured;
+        self.predicted_energy += predicted * predicted;
+        self.measured_energy += measured * measured;
+        self.product += predicted * measured;
+    }
+
+    /// Gain and offset of the line from predicted to measured samples, by least squares.
+    fn fit_line(&self) -> (f64, f64) {
+        let covariance = self.product - self.predicted * self.measured / self.count;
+        let gain = covariance / (self.predicted_energy - self.predicted.powi(2) / self.count);
+        match gain.is_finite() {
+            true => (gain, (self.measured - gain * self.predicted) / self.count),
+            false => (1.0, 0.0),
+        }
+    }
+
+    /// Energy of the samples' differences from a line.
+    fn error_of_line(&self, gain: f64, offset: f64) -> f64 {
+        let line = gain * gain * self.predicted_energy
+            + 2.0 * gain * offset * self.predicted
+            + offset * offset * self.count;
+        let product = gain * self.product + offset * self.measured;
+        (self.measured_energy - 2.0 * product + line).max(0.0)
     }
 }
 
-/// Adds the error of the picture predicted under `light`, without saturated samples. Returns predicted and measured
-/// samples.
+/// The SNR of energies of signal and error.
+fn decibels_of([signal, error]: [f64; 2]) -> Option<Decibels> {
+    (signal > 0.0 && error > 0.0).then(|| Decibels(10.0 * (signal / error).log10()))
+}
+
+/// Adds the error of the picture predicted under `light`, without saturated samples. Returns the moments of predicted and
+/// measured samples.
 fn add_error(
     errors: &mut [SnrAccumulator; CHANNELS],
     relighter: &mut CpuRelighter,
     light: &Light,
     reader: PhotographRowReader,
-) -> Result<Vec<[f64; 2]>> {
+) -> Result<SampleMoments> {
     relighter.relight(light, &AllCoresExecutor);
     let picture = relighter.linear();
     let (photo, _) = reader.read_all()?;
-    let mut samples = Vec::new();
+    let mut moments = SampleMoments::default();
     for (predicted, measured) in picture.pixels.iter().zip(&photo) {
         for c in 0..CHANNELS {
             if measured[c].is_finite() {
                 let sample = [f64::from(predicted[c]), f64::from(measured[c])];
                 errors[c].add(sample[1], sample[0]);
-                samples.push(sample);
+                moments.add(sample[0], sample[1]);
             }
         }
     }
-    Ok(samples)
+    Ok(moments)
 }

@@ -30,10 +30,13 @@ impl HoldoutSplit {
     /// The same without the patterns that are `left_out`.
     pub fn without(patterns: &[Pattern], left_out: impl Fn(usize) -> bool) -> Self {
         let all: Vec<usize> = (0..patterns.len()).filter(|&l| !left_out(l)).collect();
-        let ids = pattern_ids(patterns);
-        let is_held_out = |l: &usize| ids[*l] % HELD_OUT_EVERY == HELD_OUT_EVERY / 2;
-        let (mut held_out, mut training): (Vec<usize>, Vec<usize>) =
-            all.iter().copied().partition(is_held_out);
+        // Of those that may be used, so that every tenth of them is held out.
+        let ids = pattern_ids(all.iter().map(|&l| &patterns[l]));
+        let numbered = all.iter().copied().zip(ids);
+        let (held, rest): (Vec<_>, Vec<_>) =
+            numbered.partition(|(_, id)| id % HELD_OUT_EVERY == HELD_OUT_EVERY / 2);
+        let [mut held_out, mut training] =
+            [held, rest].map(|list| list.into_iter().map(|(l, _)| l).collect::<Vec<usize>>());
         if training.len() < MIN_PATTERNS || held_out.is_empty() {
             (held_out, training) = (Vec::new(), all.clone());
         }
@@ -46,8 +49,8 @@ impl HoldoutSplit {
 }
 
 /// Ids of the patterns, from 0 in order of appearance; equal patterns have one id.
-pub(super) fn pattern_ids(patterns: &[Pattern]) -> Vec<usize> {
-    capture::group_ids(patterns.iter().map(Planes))
+pub(super) fn pattern_ids<'a>(patterns: impl IntoIterator<Item = &'a Pattern>) -> Vec<usize> {
+    capture::group_ids(patterns.into_iter().map(Planes))
 }
 
 /// A pattern, equal to another if all planes are, grey or not.
@@ -89,6 +92,15 @@ mod tests {
         assert_eq!(split.training.len(), 23);
         assert!(!split.training.contains(&5) && !split.training.contains(&15));
         assert!(split.all.iter().copied().eq(0..25));
+    }
+
+    #[test]
+    fn every_tenth_of_the_remaining_patterns_is_held_out() {
+        let patterns: Vec<Pattern> = (0..40u8).map(|i| grey(f32::from(i))).collect();
+        let split = HoldoutSplit::without(&patterns, |l| (10..30).contains(&l));
+        assert_eq!(split.held_out, [5, 35]);
+        assert_eq!(split.all.len(), 20);
+        assert!(!split.training.iter().any(|l| (10..30).contains(l)));
     }
 
     #[test]

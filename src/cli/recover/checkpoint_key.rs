@@ -124,8 +124,8 @@ impl FileDigest {
     }
 }
 
-/// CRC-32C of what a recovery learned or chose: its geometry, basis, weight of the common mode, and SNR on held-out
-/// patterns. Another build or machine may learn different values from the same photographs, and its tiles would not
+/// CRC-32C of what a recovery learned or chose: its geometry, basis, weight of the common mode, SNR on held-out patterns,
+/// corrections of photographs, and the photographs that it leaves out. Another build or machine may learn different values from the same photographs, and its tiles would not
 /// fit.
 pub fn recovery_fingerprint(recovery: &PreparedRecovery) -> u32 {
     let geometry = recovery.geometry();
@@ -134,13 +134,22 @@ pub fn recovery_fingerprint(recovery: &PreparedRecovery) -> u32 {
     let validation = recovery.holdout_validation();
     let snr = validation.and_then(HoldoutValidation::snr);
     let chosen = [common_mode, snr.map(|snr| snr.0)].map(|value| value.unwrap_or(f64::NAN));
+    let corrections = recovery.corrections().iter();
+    let corrections = corrections.flat_map(|correction| [correction.scale, correction.offset]);
+    let left_out = recovery.faults().iter().map(|fault| fault.0 as f64);
     let basis = recovery.basis().into_iter().flat_map(|b| b.kernels.iter());
     let bytes: Vec<u8> = geometry
         .sides()
         .into_iter()
         .flatten()
         .flat_map(u32::to_le_bytes)
-        .chain(affine.chain(chosen).flat_map(f64::to_le_bytes))
+        .chain(
+            affine
+                .chain(chosen)
+                .chain(corrections)
+                .chain(left_out)
+                .flat_map(f64::to_le_bytes),
+        )
         .chain(basis.flatten().flat_map(|value| value.to_le_bytes()))
         .collect();
     crc32c::crc32c(&bytes)

@@ -92,6 +92,7 @@ impl RecoverJob<'_> {
         checkpoint: &Mutex<Checkpoint>,
     ) -> Result<RecoverReport> {
         let mut warnings = Warnings::default();
+        warnings.add(messages::unknown_fields(self.folder));
         warnings.add(messages::saturation(saturated, &measurements));
         let prepared = self.prepare(&measurements)?;
         let recovery = &prepared.recovery;

@@ -55,16 +55,17 @@ pub fn too_little_memory(TooLittleMemory { limit, min }: TooLittleMemory) -> Err
     )
 }
 
-/// Notes fields of the manifest that are unknown.
-pub fn warn_of_unknown_fields(folder: &CaptureFolder) {
+/// Warns of fields of the manifest that are unknown.
+pub fn unknown_fields(folder: &CaptureFolder) -> Option<Warning> {
     let unknown = &folder.manifest().unknown;
-    if !unknown.is_empty() {
-        eprintln!(
-            "note: {}: unknown fields are ignored: {}",
+    (!unknown.is_empty()).then(|| Warning {
+        code: "unknown-fields",
+        message: format!(
+            "{}: unknown fields are ignored: {}",
             folder.manifest_path().display(),
             join_first(unknown.iter().cloned())
-        );
-    }
+        ),
+    })
 }
 
 /// Notes saturated samples, and warns if there are too many.
@@ -135,7 +136,7 @@ pub fn photographs(
     recovery: &PreparedRecovery,
 ) -> Vec<Warning> {
     let listed = &folder.manifest().shots;
-    note_corrections(recovery.corrections(), &|l| &listed[shots[l]].photo);
+    note_corrections(recovery, &|l| &listed[shots[l]].photo);
     let warning = |&(l, fault): &(usize, PhotographFault)| {
         let shot = |l: usize| &listed[shots[l]];
         let (index, own) = (shots[l], shot(l));
@@ -196,22 +197,27 @@ pub fn photographs(
 }
 
 /// Notes exposures and stray light that are corrected.
-fn note_corrections<'a>(corrections: &[LinearCorrection], name: &dyn Fn(usize) -> &'a String) {
+fn note_corrections<'a>(recovery: &PreparedRecovery, name: &dyn Fn(usize) -> &'a String) {
+    let is_used = |l: usize| recovery.faults().iter().all(|fault| fault.0 != l);
+    let corrections = recovery.corrections().iter().enumerate();
+    let corrections: Vec<(usize, &LinearCorrection)> =
+        corrections.filter(|(l, _)| is_used(*l)).collect();
     if corrections.is_empty() {
         return;
     }
-    let gains = corrections.iter().map(|correction| correction.gain() - 1.0);
+    let gains = corrections
+        .iter()
+        .map(|(l, correction)| (*l, correction.gain() - 1.0));
     let count = corrections.len() as f64;
-    let deviation = (gains.clone().map(|gain| gain * gain).sum::<f64>() / count).sqrt();
+    let squares = gains.clone().map(|(_, gain)| gain * gain);
+    let deviation = (squares.sum::<f64>() / count).sqrt();
     if deviation > MIN_NOTED_DEVIATION {
         eprintln!(
             "note: exposures differ from those declared by {:.1} % (standard deviation); this is corrected",
             100.0 * deviation
         );
     }
-    let far = gains
-        .enumerate()
-        .filter(|(_, gain)| gain.abs() > MIN_NAMED_DEVIATION);
+    let far = gains.filter(|(_, gain)| gain.abs() > MIN_NAMED_DEVIATION);
     let far: Vec<String> = far
         .map(|(l, gain)| format!("{} ({:.2} times)", name(l), 1.0 + gain))
         .collect();
@@ -223,7 +229,7 @@ fn note_corrections<'a>(corrections: &[LinearCorrection], name: &dyn Fn(usize) -
     }
     let stray = corrections
         .iter()
-        .map(|correction| correction.stray_light());
+        .map(|(_, correction)| correction.stray_light());
     let [least, most] = [
         stray.clone().fold(f64::INFINITY, f64::min),
         stray.fold(0.0, f64::max),

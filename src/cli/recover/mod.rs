@@ -35,7 +35,6 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     drop(OutputFile::create(&args.output, &LTM)?);
     let folder = CaptureFolder::open(&args.capture)?;
     let manifest = folder.manifest();
-    messages::warn_of_unknown_fields(&folder);
     let shots = select_shots(&manifest.shots, args.patterns.map(|k| k as usize))
         .map_err(messages::too_few_shots)?;
     if shots.len() < MIN_PATTERNS {

@@ -41,7 +41,7 @@ impl LinearCorrection {
 
     /// The light in the photograph that does not come from the light plane, in units of the measurement.
     pub fn stray_light(self) -> f64 {
-        -self.offset / self.scale
+        (0.0 - self.offset) / self.scale
     }
 }
 

@@ -10,7 +10,7 @@
 //! not pass for stray light, which does not depend on brightness.
 
 use super::estimate::MAX_PHOTOGRAPHS;
-use super::window_covariance::{ScaledPixel, WindowCovariance};
+use super::window_covariance::{ScaledPixel, WindowCovariance, WindowModel};
 use crate::job_executor::{Cancelled, Executor, PARTS};
 use crate::linalg::{self, add_scaled, dot, vectorise};
 use crate::recover::preparation_input::RecoveryPreparationInput;
@@ -96,7 +96,7 @@ pub(super) fn for_largest_window(
 pub(in crate::recover) fn max_bytes(window: Window, photographs: usize) -> usize {
     let photographs = photographs.min(MAX_PHOTOGRAPHS);
     let sums = (2 * PARTS + 2) * unknowns(photographs).pow(2);
-    let window = PARTS * photographs * (4 * photographs + 2 * window.area());
+    let window = PARTS * photographs * (14 * photographs + 2 * window.area());
     (sums + window) * size_of::<f64>()
 }
 
@@ -162,7 +162,7 @@ impl CalibrationSums {
     ) {
         let measurements = preparation.measurements;
         for (plane, channels) in measurements.planes() {
-            let window = WindowCovariance::new(
+            let model = WindowModel::new(
                 measurements,
                 &preparation.geometry,
                 mean_function,
@@ -170,9 +170,10 @@ impl CalibrationSums {
                 plane,
                 pattern_indices,
             );
-            let Some(window) = window else { continue };
-            let pixels = window.scaled_pixels(measurements, pixels, channels, pattern_indices);
-            self.add_pixels(&window, &pixels);
+            let window = model.with_pixels(measurements, pattern_indices, pixels, channels);
+            if let Some((window, pixels)) = window {
+                self.add_pixels(&window, &pixels);
+            }
         }
     }
 
@@ -194,15 +195,24 @@ impl CalibrationSums {
         let [mut offsets, mut leaks, mut offset_leaks] = [0.0; 3];
         let mut solved = vec![0.0; l];
         for pixel in pixels {
-            linalg::multiply_vector(&window.inverse, &pixel.residual(&window.means), &mut solved);
+            linalg::multiply_vector(
+                &window.inverse,
+                &pixel.residual(&window.model.means),
+                &mut solved,
+            );
+            // Relative to the variance of the model, and to that of model and noise.
             let deviation = |i: usize| solved[i] * solved[i] / window.inverse[i * l + i];
-            let mean = (0..l).map(deviation).sum::<f64>() / l as f64;
-            let weight = 1.0 / (mean + MIN_DEVIATION);
+            let noisy_deviation =
+                |i: usize| deviation(i) / (1.0 + window.inverse[i * l + i] * pixel.noise[i]);
+            let mean =
+                |deviation: &dyn Fn(usize) -> f64| (0..l).map(deviation).sum::<f64>() / l as f64;
+            let weight = 1.0 / (mean(&deviation) + MIN_DEVIATION);
+            let typical = mean(&noisy_deviation).max(f64::MIN_POSITIVE);
             let mean = pixel.y.iter().sum::<f64>() / l as f64;
             let [right, down] = &pixel.gradients;
             let columns = [&pixel.y, right, down];
             for i in 0..l {
-                self.deviations[i] += weight * deviation(i);
+                self.deviations[i] += noisy_deviation(i) / typical;
                 let left_out = solved[i] / window.inverse[i * l + i];
                 self.energies[0] += weight * left_out * left_out;
                 self.energies[1] += weight * (pixel.y[i] - mean).powi(2);
@@ -220,12 +230,12 @@ impl CalibrationSums {
                 }
                 let range = a * l..(a + 1) * l;
                 add_scaled(&mut offset_sums[range.clone()], weight * pixel.unit, column);
-                add_scaled(&mut leak_sums[range], weight * pixel.certainty, column);
+                add_scaled(&mut leak_sums[range], weight * pixel.weight, column);
             }
-            score[n - 1] -= weight * pixel.certainty * solved.iter().sum::<f64>();
+            score[n - 1] -= weight * pixel.weight * solved.iter().sum::<f64>();
             offsets += weight * pixel.unit * pixel.unit;
-            offset_leaks += weight * pixel.unit * pixel.certainty;
-            leaks += weight * pixel.certainty * pixel.certainty;
+            offset_leaks += weight * pixel.unit * pixel.weight;
+            leaks += weight * pixel.weight * pixel.weight;
         }
         self.count += pixels.len() as f64;
         let (rows, leak_row) = self.hessian.split_at_mut(n * (n - 1));
@@ -315,17 +325,18 @@ impl CalibrationSums {
     }
 }
 
-/// The leave-one-out model's prediction of photographs that it does not use, `[other]`, for a pixel of `window`.
+/// The prediction of photographs that are not in the window's list, `[other]`, for one of its pixels.
 pub(super) fn predict(
     window: &WindowCovariance,
-    others: &WindowCovariance,
+    others: &WindowModel,
     pixel: &ScaledPixel,
 ) -> Vec<f64> {
-    let l = window.means.len();
+    let l = window.model.means.len();
     let mut solved = vec![0.0; l];
-    linalg::multiply_vector(&window.inverse, &pixel.residual(&window.means), &mut solved);
-    let cross = window.cross_covariance(others);
+    let residual = pixel.residual(&window.model.means);
+    linalg::multiply_vector(&window.inverse, &residual, &mut solved);
+    let cross = window.model.cross_covariance(others);
     let rows = cross.chunks_exact(l).zip(&others.means);
-    rows.map(|(row, mean)| pixel.certainty * mean + dot(row, &solved))
+    rows.map(|(row, mean)| pixel.weight * mean + dot(row, &solved))
         .collect()
 }

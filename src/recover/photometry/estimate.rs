@@ -29,8 +29,8 @@ const MAX_OUTLIER_SHARE: f64 = 0.2;
 const MIN_SHIFT: f64 = 0.1;
 const SHIFT_ERRORS: f64 = 3.0;
 const MAX_SHIFT_ERROR: f64 = 0.05;
-/// Median shift of the other photographs, in camera pixels, up to which the camera stood still.
-const MAX_TREMOR: f64 = 0.06;
+/// Median shift of the other photographs, in camera pixels, up to which the camera was steady.
+const MAX_STEADY_SHIFT: f64 = 0.06;
 /// Largest share of the photographs that may be left out because the camera moved.
 const MAX_MOVED_SHARE: f64 = 0.6;
 /// Share of the differences between photographs that may be unexplained. Otherwise these are not photographs of their
@@ -41,6 +41,8 @@ const MIN_SQUARES: usize = 32;
 pub(super) const MAX_PHOTOGRAPHS: usize = 256;
 /// Fewest photographs that predict one another.
 const MIN_PHOTOGRAPHS: usize = 3 * MIN_PATTERNS;
+/// Fewest photographs that must remain.
+const MIN_USED: usize = 2 * MIN_PATTERNS;
 /// Range of a correction's scale. A photograph of something else has none.
 const SCALES: [f64; 2] = [0.05, 20.0];
 
@@ -82,9 +84,10 @@ pub(in crate::recover) async fn estimate(
             continue;
         }
         let (mut found, shifted) = (step.outliers(), step.shifted());
-        // After a bump, an outlier from the other place is no other object.
-        let is_bump = found.is_empty() || !moved.is_empty();
-        if is_bump && shifted.len() as f64 <= MAX_MOVED_SHARE * used.len() as f64 {
+        // After a move, an outlier from the other place is no other object.
+        let may_be_moved = found.is_empty() || !moved.is_empty();
+        let all_moved = moved.len() + shifted.len();
+        if may_be_moved && all_moved as f64 <= MAX_MOVED_SHARE * count as f64 {
             found.retain(|i| shifted.iter().all(|(other, _)| other != i));
             let faults = shifted.iter();
             moved.extend(faults.map(|&(i, shift)| (used[i], PhotographFault::Moved { shift })));
@@ -98,6 +101,9 @@ pub(in crate::recover) async fn estimate(
         }
         outliers.extend(found.iter().map(|&i| used[i]));
         used.retain(|l| !outliers.contains(l) && !is_left_out(l));
+        if used.len() < MIN_USED {
+            return Ok(Photometry::default());
+        }
         steps = 0;
     };
     // NaN where photographs do not differ at all.
@@ -157,8 +163,7 @@ impl CorrectionStep {
     }
 
     /// Photographs whose picture is shifted, by their positions, with the shift. The camera's place is that in the first half
-    /// of the session: the Gray code comes before it. None if the others are not steady either: nothing is won without
-    /// the worst.
+    /// of the capture: the Gray code comes before it. None if the others moved as well.
     fn shifted(&self) -> Vec<(usize, [f64; 2])> {
         let first_half = self.shifts[0].len().div_ceil(2);
         let place = [0, 1].map(|axis| median(&self.shifts[axis][..first_half]));
@@ -176,7 +181,7 @@ impl CorrectionStep {
         }
         let distances = steady.iter().map(|(_, [x, y])| (x * x + y * y).sqrt());
         let deviation = median(&distances.collect::<Vec<f64>>());
-        match deviation < MAX_TREMOR {
+        match deviation < MAX_STEADY_SHIFT {
             true => shifted,
             false => Vec::new(),
         }

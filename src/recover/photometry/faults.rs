@@ -4,9 +4,10 @@
 //! another pattern, both together, or the brightness of the object alone.
 
 use super::equations::{for_largest_window, predict};
-use super::window_covariance::WindowCovariance;
+use super::window_covariance::WindowModel;
 use crate::job_executor::{Cancelled, Executor, PARTS};
 use crate::linalg::{self, add_scaled};
+use crate::recover::holdout_split::pattern_ids;
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::transport::TileRect;
 
@@ -78,19 +79,16 @@ pub(super) async fn classify(
     if outliers.is_empty() {
         return Ok(Vec::new());
     }
-    let count = preparation.measurements.patterns.len();
+    let patterns = &preparation.measurements.patterns;
+    let (count, ids) = (patterns.len(), pattern_ids(patterns));
+    let left_out: Vec<usize> = (0..count).filter(|l| !used.contains(l)).collect();
     let size = FIRST_PHOTOGRAPH + count + outliers.len();
     let sum_part = |part: usize| {
         let mut moments = vec![0.0; size * size];
         let share = |part: usize| part * squares.len() / PARTS;
         for square in &squares[share(part)..share(part + 1)] {
-            add_square(
-                &mut moments,
-                preparation,
-                mean_function,
-                *square,
-                [used, outliers],
-            );
+            let lists = [used, &left_out, outliers];
+            add_square(&mut moments, preparation, mean_function, *square, lists);
         }
         moments
     };
@@ -113,7 +111,8 @@ pub(super) async fn classify(
     let fault = |(i, &l): (usize, &usize)| {
         let target = FIRST_PHOTOGRAPH + count + i;
         let own = FIRST_PHOTOGRAPH + l;
-        let others = (0..count).filter(|&other| other != l);
+        // Of other patterns, not of other exposures.
+        let others = (0..count).filter(|&other| ids[other] != ids[l]);
         let best = |regressors: &dyn Fn(usize) -> Vec<usize>| {
             let errors = others.clone().map(|other| {
                 let unexplained =
@@ -148,21 +147,21 @@ pub(super) async fn classify(
     Ok(outliers.iter().enumerate().map(fault).collect())
 }
 
-/// Adds the products of a square's regressors: a constant, brightness, each photograph (as measured, or as predicted if
-/// it is an outlier), and the outliers as measured.
+/// Adds the products of a square's regressors: a constant, brightness, each photograph (as measured if it is `used`, else as
+/// predicted), and the outliers as measured.
 fn add_square(
     moments: &mut [f64],
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
     mean_function: &[f64],
     square: TileRect,
-    [used, outliers]: [&[usize]; 2],
+    [used, left_out, outliers]: [&[usize]; 3],
 ) {
     let (measurements, geometry) = (preparation.measurements, &preparation.geometry);
     let count = measurements.patterns.len();
     for_largest_window(preparation, square, |origin, pixels| {
         for (plane, channels) in measurements.planes() {
-            let covariance = |indices: &[usize]| {
-                WindowCovariance::new(
+            let model = |indices: &[usize]| {
+                WindowModel::new(
                     measurements,
                     geometry,
                     mean_function,
@@ -171,34 +170,30 @@ fn add_square(
                     indices,
                 )
             };
-            let (Some(window), Some(others)) = (covariance(used), covariance(outliers)) else {
+            let others = model(left_out);
+            let window = model(used).with_pixels(measurements, used, pixels, channels);
+            let Some((window, pixels)) = window else {
                 continue;
             };
-            for &(_, pixel) in pixels {
-                for c in channels.clone() {
-                    let scaled = window.scaled_pixels(measurements, &[(0, pixel)], c..c + 1, used);
-                    let sample = |&l: &usize| measurements.sample(l, pixel, c);
-                    let measured: Vec<f64> = outliers.iter().map(sample).collect();
-                    let Some(scaled) = scaled.first() else {
-                        continue;
-                    };
-                    if measured.iter().any(|y| y.is_nan()) {
-                        continue;
-                    }
-                    let mut regressors = vec![0.0; FIRST_PHOTOGRAPH + count];
-                    regressors[CONSTANT] = scaled.unit;
-                    regressors[BRIGHTNESS] = scaled.certainty;
-                    for (&l, y) in used.iter().zip(&scaled.y) {
-                        regressors[FIRST_PHOTOGRAPH + l] = *y;
-                    }
-                    for (&l, y) in outliers.iter().zip(predict(&window, &others, scaled)) {
-                        regressors[FIRST_PHOTOGRAPH + l] = y;
-                    }
-                    regressors.extend(measured.iter().map(|y| scaled.unit * y));
-                    let rows = moments.chunks_exact_mut(regressors.len());
-                    for (row, factor) in rows.zip(&regressors) {
-                        add_scaled(row, *factor, &regressors);
-                    }
+            for scaled in &pixels {
+                let sample = |&l: &usize| measurements.sample(l, scaled.pixel, scaled.channel);
+                let measured: Vec<f64> = outliers.iter().map(sample).collect();
+                if measured.iter().any(|y| y.is_nan()) {
+                    continue;
+                }
+                let mut regressors = vec![0.0; FIRST_PHOTOGRAPH + count];
+                regressors[CONSTANT] = scaled.unit;
+                regressors[BRIGHTNESS] = scaled.weight;
+                for (&l, y) in used.iter().zip(&scaled.y) {
+                    regressors[FIRST_PHOTOGRAPH + l] = *y;
+                }
+                for (&l, y) in left_out.iter().zip(predict(&window, &others, scaled)) {
+                    regressors[FIRST_PHOTOGRAPH + l] = y;
+                }
+                regressors.extend(measured.iter().map(|y| scaled.unit * y));
+                let rows = moments.chunks_exact_mut(regressors.len());
+                for (row, factor) in rows.zip(&regressors) {
+                    add_scaled(row, *factor, &regressors);
                 }
             }
         }

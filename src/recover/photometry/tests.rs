@@ -111,3 +111,26 @@ fn nothing_is_changed_where_too_many_photographs_seem_not_to_belong() {
     let photometry = photometry(|measurements| measurements.photos.rotate_left(1));
     assert!(photometry.faults.is_empty());
 }
+
+#[test]
+fn noisy_exposures_of_one_pattern_are_no_outliers() {
+    let mut random = uniform(5);
+    let mut normal = move || (0..12).map(|_| random()).sum::<f64>();
+    let photometry = photometry(|measurements| {
+        // Every fourth pattern again, at an eighth of the exposure.
+        for l in (0..PATTERNS).step_by(4) {
+            measurements.patterns[l + 1] = measurements.patterns[l].clone();
+            measurements.photos[l + 1] = measurements.photos[l].clone();
+            measurements.full_scale[l + 1] = 8.0;
+        }
+        measurements.noise.gain = [1e-4; CHANNELS];
+        for l in 0..PATTERNS {
+            let exposure = f64::from(measurements.full_scale[l]).recip();
+            for sample in measurements.photos[l].iter_mut().flatten() {
+                let variance = 1e-4 * f64::from(*sample) / exposure;
+                *sample += (variance.sqrt() * normal()) as f32;
+            }
+        }
+    });
+    assert!(photometry.faults.is_empty(), "{photometry:?}");
+}

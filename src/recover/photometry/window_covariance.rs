@@ -2,7 +2,10 @@
 //!
 //! Divided by the pixel's brightness, measurements are taken to have the mean `m = P̂h`, with the mean function h, and the
 //! covariance `K = P̂ diag(v) P̂ᵀ + mmᵀ + ε²I`: every element of the function varies by itself with the variance
-//! `v = 1.2 h²`, and the brightness is unknown.
+//! `v = 1.2 h²`, and the brightness is unknown. Noise is not part of K, as its estimate takes faults for noise; but no
+//! photograph is blamed for its own noise.
+
+use std::ops::Range;
 
 use super::CalibratedMeasurements;
 use crate::linalg::{self, dot};
@@ -18,39 +21,47 @@ const UNEXPLAINED_VARIANCE: f64 = 1e-5;
 /// more noise than that say less.
 const MODEL_VARIANCE: f64 = 0.01;
 
-/// The model of the photographs `pattern_indices` at one window.
-pub(super) struct WindowCovariance {
+/// What the model says of the photographs of a list at one window.
+pub(super) struct WindowModel {
     /// `m`, `[L]`.
     pub means: Vec<f64>,
-    /// `K⁻¹`, `[L, L]`.
-    pub inverse: Vec<f64>,
-    /// Factor of K: `FFᵀ = K − ε²I`, `[L, S + 1]`.
+    /// Factor of K without its diagonal: `FFᵀ = K − ε²I`, `[L, S + 1]`.
     factor: Vec<f64>,
 }
 
-/// A pixel's channel: measurements divided by its brightness, times the square root of its certainty.
+/// The model with the inverse of its covariance.
+pub(super) struct WindowCovariance {
+    pub model: WindowModel,
+    /// `K⁻¹`, `[L, L]`.
+    pub inverse: Vec<f64>,
+}
+
+/// A pixel's channel: measurements divided by its brightness, times its weight.
 pub(super) struct ScaledPixel {
+    pub pixel: CameraPixel,
+    pub channel: usize,
     /// `[L]`.
     pub y: Vec<f64>,
     /// What a measurement of 1 becomes.
     pub unit: f64,
-    /// The square root of the certainty, 1 without noise.
-    pub certainty: f64,
+    /// 1 without noise.
+    pub weight: f64,
     /// Differences of `y` per camera pixel to the right and down, `[2][L]`; zero where a neighbour is not measured.
     pub gradients: [Vec<f64>; 2],
+    /// Variance of the noise of `y`, `[L]`.
+    pub noise: Vec<f64>,
 }
 
 impl ScaledPixel {
     /// Measurements less their mean, `[L]`.
     pub fn residual(&self, means: &[f64]) -> Vec<f64> {
         let pairs = self.y.iter().zip(means);
-        pairs.map(|(y, m)| y - self.certainty * m).collect()
+        pairs.map(|(y, m)| y - self.weight * m).collect()
     }
 }
 
-impl WindowCovariance {
-    /// For the window at `origin` and the patterns' plane `plane`; `mean_function` is `[slot]`. `None` if the window is
-    /// off the light plane.
+impl WindowModel {
+    /// For the window at `origin` and the patterns' plane `plane`; `mean_function` is `[slot]`.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn new(
         measurements: &CalibratedMeasurements<'_>,
@@ -59,11 +70,11 @@ impl WindowCovariance {
         origin: LightElement,
         plane: usize,
         pattern_indices: &[usize],
-    ) -> Option<Self> {
+    ) -> Self {
         let elements: Vec<_> = geometry.elements_of_window(origin).collect();
-        let (patterns, width) = (pattern_indices.len(), elements.len() + 1);
-        let mut factor = vec![0.0; patterns * width];
-        let mut means = Vec::with_capacity(patterns);
+        let width = elements.len() + 1;
+        let mut factor = vec![0.0; pattern_indices.len() * width];
+        let mut means = Vec::with_capacity(pattern_indices.len());
         for (&l, row) in pattern_indices.iter().zip(factor.chunks_exact_mut(width)) {
             let pattern = measurements.patterns[l].plane(plane);
             let mut mean = 0.0;
@@ -75,49 +86,28 @@ impl WindowCovariance {
             row[width - 1] = mean;
             means.push(mean);
         }
-        let mut covariance = vec![0.0; patterns * patterns];
-        for i in 0..patterns {
-            for j in i..patterns {
-                covariance[i * patterns + j] = dot(row(&factor, width, i), row(&factor, width, j));
-            }
-            covariance[i * patterns + i] += UNEXPLAINED_VARIANCE;
-        }
-        if means.iter().sum::<f64>() <= 0.0 {
-            return None;
-        }
-        linalg::cholesky(&mut covariance, patterns)?;
-        let mut scratch = vec![0.0; patterns * patterns];
-        let mut inverse = vec![0.0; patterns * patterns];
-        linalg::cholesky_inverse(&covariance, patterns, &mut scratch, &mut inverse);
-        linalg::mirror_upper(&mut inverse, patterns);
-        Some(Self {
-            means,
-            inverse,
-            factor,
-        })
+        Self { means, factor }
     }
 
-    /// `K(others, these)`, the covariance of this window's photographs with another list of photographs of it,
-    /// `[other, L]`.
+    /// The covariance of the photographs of `others` with those of this list, `[other, L]`.
     pub fn cross_covariance(&self, others: &Self) -> Vec<f64> {
-        let (patterns, width) = (self.means.len(), self.factor.len() / self.means.len());
-        let entry = |i: usize| {
-            let (other, this) = (i / patterns, i % patterns);
-            dot(
-                row(&others.factor, width, other),
-                row(&self.factor, width, this),
-            )
-        };
-        (0..others.means.len() * patterns).map(entry).collect()
+        let rows = others.rows();
+        let products = rows.flat_map(|other| self.rows().map(move |this| dot(other, this)));
+        products.collect()
     }
 
-    /// The channels of `pixels` that no photograph saturates and that are brighter than black.
-    pub fn scaled_pixels(
+    fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.factor
+            .chunks_exact(self.factor.len() / self.means.len())
+    }
+
+    /// The channels of `pixels` that no photograph of the list saturates and that are brighter than black.
+    fn scaled_pixels(
         &self,
         measurements: &CalibratedMeasurements<'_>,
-        pixels: &PixelsSharingWindow,
-        channels: std::ops::Range<usize>,
         pattern_indices: &[usize],
+        pixels: &PixelsSharingWindow,
+        channels: Range<usize>,
     ) -> Vec<ScaledPixel> {
         let count = pattern_indices.len() as f64;
         let level = self.means.iter().sum::<f64>() / count;
@@ -129,28 +119,62 @@ impl WindowCovariance {
             let mut y: Vec<f64> = pattern_indices.iter().map(sample).collect();
             let mean = y.iter().sum::<f64>() / count;
             let brightness = mean / level;
-            // The mean is NaN if a sample is saturated.
-            if brightness.is_nan() || brightness <= 0.0 {
+            // The mean is NaN if a sample is saturated, and the level is zero off the light plane.
+            if !(brightness > 0.0 && brightness.is_finite()) {
                 return None;
             }
-            let noise = |&l: &usize| measurements.variance(l, c, mean);
-            let noise = pattern_indices.iter().map(noise).sum::<f64>() / count;
-            let noise = noise / brightness.powi(2);
-            let certainty = (MODEL_VARIANCE / (MODEL_VARIANCE + noise)).sqrt();
-            let unit = certainty / brightness;
+            let noise = |&l: &usize| measurements.variance(l, c, mean) / brightness.powi(2);
+            let mut noise: Vec<f64> = pattern_indices.iter().map(noise).collect();
+            let mean_noise = noise.iter().sum::<f64>() / count;
+            let weight = (MODEL_VARIANCE / (MODEL_VARIANCE + mean_noise)).sqrt();
+            let unit = weight / brightness;
             y.iter_mut().for_each(|y| *y *= unit);
+            noise.iter_mut().for_each(|noise| *noise *= weight * weight);
             let gradients = [(1, 0), (0, 1)].map(|step| {
                 let gradient = |&l: &usize| unit * gradient(measurements, l, pixel, c, step);
                 pattern_indices.iter().map(gradient).collect()
             });
             Some(ScaledPixel {
+                pixel,
+                channel: c,
                 y,
                 unit,
-                certainty,
+                weight,
                 gradients,
+                noise,
             })
         };
         channels.filter_map(scale).collect()
+    }
+
+    /// Scales the channels of `pixels`, and inverts the covariance. `None` if no channel can be used.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    pub fn with_pixels(
+        self,
+        measurements: &CalibratedMeasurements<'_>,
+        pattern_indices: &[usize],
+        pixels: &PixelsSharingWindow,
+        channels: Range<usize>,
+    ) -> Option<(WindowCovariance, Vec<ScaledPixel>)> {
+        let pixels = self.scaled_pixels(measurements, pattern_indices, pixels, channels);
+        if pixels.is_empty() {
+            return None;
+        }
+        let patterns = self.means.len();
+        let mut covariance = vec![0.0; patterns * patterns];
+        for (i, row) in self.rows().enumerate() {
+            for (j, other) in self.rows().enumerate().skip(i) {
+                covariance[i * patterns + j] = dot(row, other);
+            }
+            covariance[i * patterns + i] += UNEXPLAINED_VARIANCE;
+        }
+        linalg::cholesky(&mut covariance, patterns)?;
+        let mut scratch = vec![0.0; patterns * patterns];
+        let mut inverse = vec![0.0; patterns * patterns];
+        linalg::cholesky_inverse(&covariance, patterns, &mut scratch, &mut inverse);
+        linalg::mirror_upper(&mut inverse, patterns);
+        let model = self;
+        Some((WindowCovariance { model, inverse }, pixels))
     }
 }
 
@@ -173,8 +197,4 @@ fn gradient(
     } else {
         0.5 * difference
     }
-}
-
-fn row(matrix: &[f64], width: usize, i: usize) -> &[f64] {
-    &matrix[i * width..(i + 1) * width]
 }
