@@ -147,7 +147,7 @@ impl EvaluateReport {
         let plane = relighter.transport().geometry.light;
         let dark = folder.read_dark()?;
         let mut errors = [SnrAccumulator::default(); CHANNELS];
-        let mut fitted_energies = [0.0; 2];
+        let mut fitted_errors = SnrAccumulator::default();
         for i in (0..folder.manifest().shots.len()).filter(|i| !used.contains(i)) {
             let light = Light::from_linear_rgb(plane, &folder.read_pattern(i)?.rgb())?;
             let mut of_photo = [SnrAccumulator::default(); CHANNELS];
@@ -165,18 +165,17 @@ impl EvaluateReport {
                 gain,
                 stray_light,
                 snr_db: of_photo.into_iter().sum::<SnrAccumulator>().snr(),
-                fitted_snr_db: decibels_of([moments.measured_energy, fitted]),
+                fitted_snr_db: fitted.snr(),
             });
             for (sum, error) in errors.iter_mut().zip(of_photo) {
-                *sum = [*sum, error].into_iter().sum();
+                sum.merge(error);
             }
-            fitted_energies[0] += moments.measured_energy;
-            fitted_energies[1] += fitted;
+            fitted_errors.merge(fitted);
         }
         self.heldout_shots = self.heldout_table.len();
         self.heldout_rgb_snr_db = errors.map(|e| e.snr());
         self.heldout_snr_db = errors.into_iter().sum::<SnrAccumulator>().snr();
-        self.heldout_fitted_snr_db = decibels_of(fitted_energies);
+        self.heldout_fitted_snr_db = fitted_errors.snr();
         if self
             .heldout_fitted_snr_db
             .is_some_and(|snr| snr < MIN_SAME_OBJECT_SNR)
@@ -247,19 +246,15 @@ impl SampleMoments {
         }
     }
 
-    /// Energy of the samples' differences from a line.
-    fn error_of_line(&self, gain: f64, offset: f64) -> f64 {
+    /// Error of a line from predicted to measured samples.
+    fn error_of_line(&self, gain: f64, offset: f64) -> SnrAccumulator {
         let line = gain * gain * self.predicted_energy
             + 2.0 * gain * offset * self.predicted
             + offset * offset * self.count;
         let product = gain * self.product + offset * self.measured;
-        (self.measured_energy - 2.0 * product + line).max(0.0)
+        let error = (self.measured_energy - 2.0 * product + line).max(0.0);
+        SnrAccumulator::from_energies(self.measured_energy, error)
     }
-}
-
-/// The SNR of energies of signal and error.
-fn decibels_of([signal, error]: [f64; 2]) -> Option<Decibels> {
-    (signal > 0.0 && error > 0.0).then(|| Decibels(10.0 * (signal / error).log10()))
 }
 
 /// Adds the error of the picture predicted under `light`, without saturated samples. Returns the moments of predicted and

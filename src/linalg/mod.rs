@@ -23,6 +23,6 @@ pub(crate) use kernels::{
     dot, multiply_rows, set_scaled_sum,
 };
 pub(crate) use matrix::{mirror_upper, multiply, multiply_vector, transpose};
-pub(crate) use order::{ascending_order, sort};
+pub(crate) use order::{ascending_order, median, sort};
 pub(crate) use vector::{add_scaled_rows, padded_len};
 pub(crate) use vectorise::vectorise;

@@ -14,6 +14,13 @@ pub(crate) fn sort(values: &mut [f64]) {
     }
 }
 
+/// The middle one of the values in ascending order; of an even number, the larger of two.
+pub(crate) fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sort(&mut sorted);
+    sorted[sorted.len() / 2]
+}
+
 #[inline(never)]
 fn sorted_pairs(mut pairs: Vec<(f64, usize)>) -> Vec<(f64, usize)> {
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -19,7 +19,7 @@ use super::photometry::CalibratedMeasurements;
 use super::preparation_input;
 use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::{Measurements, group_count};
-use crate::job_executor::{Executor, PARTS, set_values, values};
+use crate::job_executor::{Executor, PARTS, set_values, share_of_jobs, values};
 use crate::linalg::{self, add_scaled, ascending_order, vectorise};
 use crate::transport::{CameraPixel, Geometry, LightElement, TileRect, Window};
 
@@ -93,8 +93,7 @@ impl WindowSizeEstimate {
         // A part of the picture for each job, and for the jackknife.
         let sum_part = |part: usize| {
             let mut sums = NormalEquations::zeros(rings.count());
-            let start = |part: usize| part * squares.len() / PARTS;
-            for square in &squares[start(part)..start(part + 1)] {
+            for square in &squares[share_of_jobs(squares.len(), part, PARTS)] {
                 for (origin, pixels) in sampling::pixels_by_window(&geometry, *square) {
                     vectorise(
                         #[cfg_attr(target_arch = "x86_64", inline(always))]

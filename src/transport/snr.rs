@@ -34,6 +34,11 @@ impl SnrAccumulator {
         self.error += (truth - estimate) * (truth - estimate);
     }
 
+    /// From the energies of true values, and of the errors of their estimates.
+    pub fn from_energies(signal: f64, error: f64) -> Self {
+        Self { signal, error }
+    }
+
     /// Adds the sums of other entries, for instance of another thread.
     pub fn merge(&mut self, other: Self) {
         self.signal += other.signal;

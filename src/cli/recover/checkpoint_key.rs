@@ -125,8 +125,8 @@ impl FileDigest {
 }
 
 /// CRC-32C of what a recovery learned or chose: its geometry, basis, weight of the common mode, SNR on held-out patterns,
-/// corrections of photographs, and the photographs that it leaves out. Another build or machine may learn different values from the same photographs, and its tiles would not
-/// fit.
+/// corrections of photographs, and the photographs that it leaves out. Another build or machine may learn different values
+/// from the same photographs, and its tiles would not fit.
 pub fn recovery_fingerprint(recovery: &PreparedRecovery) -> u32 {
     let geometry = recovery.geometry();
     let affine = geometry.correspondence.affine.into_iter().flatten();

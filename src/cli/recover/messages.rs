@@ -173,11 +173,10 @@ pub fn photographs(
             message: format!("shots[{index}] ({}) is left out: {reason}", own.photo),
         }
     };
-    let is_moved = |fault: &PhotographFault| matches!(fault, PhotographFault::Moved { .. });
     let (moved, others): (Vec<_>, Vec<_>) = recovery
         .faults()
         .iter()
-        .partition(|(_, fault)| is_moved(fault));
+        .partition(|(_, fault)| fault.is_moved());
     let mut warnings: Vec<Warning> = others.iter().map(warning).collect();
     // Many photographs, and one cause.
     if let Some((first, more)) = moved.split_first() {

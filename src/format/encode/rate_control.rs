@@ -3,11 +3,11 @@
 //! Both are found by bisection on a sample. Components whose energy is far below the quantisation error
 //! are then dropped.
 
-use super::exp2;
 use std::convert::Infallible;
 
 use super::assembly::{self, EncodedFile, QuantisedTile};
 use super::encoder_input::{DistortionMetric, EncoderInput, EncodingTarget};
+use super::exp2;
 use super::rate_control_sample::{SampledTilePart, sample};
 use super::scan_costs::RateDistortionModel;
 use super::scan_plan::{self, ByteShareLimits, MAX_SHARES, ProgressiveScanPlan, SHARES};

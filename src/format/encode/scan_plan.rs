@@ -9,9 +9,9 @@
 //!   the error by less than the same bytes do elsewhere;
 //! - any later scan. An item that is larger by itself is refined in several scans.
 
-use super::exp2;
 use std::ops::Range;
 
+use super::exp2;
 use super::scan_costs::{RateDistortion, RateDistortionModel};
 use super::source_analysis::AnalysedSource;
 use crate::bisect::bisect;

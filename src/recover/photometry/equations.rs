@@ -1,22 +1,23 @@
 //! Generalised least squares for the corrections of all photographs, and for the shifts of the camera between them.
 //!
 //! A correction `s_l y_l + o_l` of small effect changes a pixel's scaled residual `r = y − m` by `D_y (s − 1) + o/f`, with
-//! `D_y = diag(y)`; a shift d of the picture is undone by `(∂y/∂x) d_x + (∂y/∂y) d_y`, to first order. The corrections minimise `Σ rᵀ K⁻¹ r` over sampled pixels and channels. The objective is quadratic:
-//! one step leads to its minimum, but for the brightness f, which depends on the corrections.
+//! `D_y = diag(y)`; a shift d of the picture is undone by `(∂y/∂x) d_x + (∂y/∂y) d_y`, to first order. The corrections
+//! minimise `Σ rᵀ K⁻¹ r` over sampled pixels and channels. The objective is quadratic: one step leads to its minimum, but
+//! for the brightness f, which depends on the corrections.
 //!
 //! Unknowns are `[scales, shifts x, shifts y, offsets, leak]`, L of each but the leak. The means of scales and shifts are
-//! fixed, as brightness and functions absorb them.
-//! The leak is the light from outside the window relative to brightness, nearly constant, the same for all pixels: it must
+//! fixed, as brightness and functions absorb them. The leak is the light from outside the window relative to brightness, nearly constant, the same for all pixels: it must
 //! not pass for stray light, which does not depend on brightness.
 
-use super::estimate::MAX_PHOTOGRAPHS;
 use super::window_covariance::{ScaledPixel, WindowCovariance, WindowModel};
-use crate::job_executor::{Cancelled, Executor, PARTS};
+use crate::job_executor::{Cancelled, Executor, PARTS, share_of_jobs};
 use crate::linalg::{self, add_scaled, dot, vectorise};
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::sampling::{self, PixelsSharingWindow};
 use crate::transport::{LightElement, TileRect, Window};
 
+/// Most photographs whose equations fit in memory.
+pub(super) const MAX_PHOTOGRAPHS: usize = 256;
 /// Weight of the constraints on means, relative to the equations'.
 const GAUGE_WEIGHT: f64 = 1e3;
 /// Added to the mean squared deviation of a pixel's photographs, whose inverse weights the pixel: how far functions are
@@ -56,10 +57,9 @@ pub(super) async fn fit(
     pattern_indices: &[usize],
 ) -> Result<Option<CorrectionStep>, Cancelled> {
     let (executor, patterns) = (preparation.executor, pattern_indices.len());
-    let share = |part: usize| part * squares.len() / PARTS;
     let sum_part = |part: usize| {
         let mut sums = CalibrationSums::zeros(patterns);
-        for square in &squares[share(part)..share(part + 1)] {
+        for square in &squares[share_of_jobs(squares.len(), part, PARTS)] {
             sums.scores
                 .resize(sums.scores.len() + unknowns(patterns), 0.0);
             for_largest_window(preparation, *square, |origin, pixels| {

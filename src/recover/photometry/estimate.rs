@@ -3,10 +3,10 @@
 //! Steps of generalised least squares alternate with tests of the residuals, until neither changes anything. A clean
 //! capture takes one step, which finds nothing significant.
 
-use super::equations::{self, CorrectionStep};
+use super::equations::{self, CorrectionStep, MAX_PHOTOGRAPHS};
 use super::{CalibratedMeasurements, LinearCorrection, PhotographFault, Photometry, faults};
 use crate::job_executor::{Cancelled, Executor};
-use crate::linalg;
+use crate::linalg::{self, median};
 use crate::recover::mean_function;
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::sampling::MIN_PATTERNS;
@@ -36,9 +36,8 @@ const MAX_MOVED_SHARE: f64 = 0.6;
 /// Share of the differences between photographs that may be unexplained. Otherwise these are not photographs of their
 /// patterns, which is told later.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.5;
-/// Fewest squares that give standard errors, and most photographs whose equations fit in memory.
+/// Fewest squares that give standard errors.
 const MIN_SQUARES: usize = 32;
-pub(super) const MAX_PHOTOGRAPHS: usize = 256;
 /// Fewest photographs that predict one another.
 const MIN_PHOTOGRAPHS: usize = 3 * MIN_PATTERNS;
 /// Fewest photographs that must remain.
@@ -237,10 +236,4 @@ fn shrunk(values: &[f64], errors: &[f64]) -> Vec<f64> {
 /// The mean square of values by that of their standard errors.
 fn mean_square_ratio(values: &[f64], errors: &[f64]) -> f64 {
     linalg::dot(values, values) / linalg::dot(errors, errors).max(f64::MIN_POSITIVE)
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    linalg::sort(&mut sorted);
-    sorted[sorted.len() / 2]
 }

@@ -5,8 +5,8 @@
 
 use super::equations::{for_largest_window, predict};
 use super::window_covariance::WindowModel;
-use crate::job_executor::{Cancelled, Executor, PARTS};
-use crate::linalg::{self, add_scaled};
+use crate::job_executor::{Cancelled, Executor, PARTS, share_of_jobs};
+use crate::linalg::{self, add_scaled, median};
 use crate::recover::holdout_split::pattern_ids;
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::transport::TileRect;
@@ -52,6 +52,11 @@ pub enum PhotographFault {
 }
 
 impl PhotographFault {
+    /// Whether the camera or the object had moved.
+    pub fn is_moved(self) -> bool {
+        matches!(self, Self::Moved { .. })
+    }
+
     /// The fault's name in reports.
     pub fn code(self) -> &'static str {
         match self {
@@ -85,8 +90,7 @@ pub(super) async fn classify(
     let size = FIRST_PHOTOGRAPH + count + outliers.len();
     let sum_part = |part: usize| {
         let mut moments = vec![0.0; size * size];
-        let share = |part: usize| part * squares.len() / PARTS;
-        for square in &squares[share(part)..share(part + 1)] {
+        for square in &squares[share_of_jobs(squares.len(), part, PARTS)] {
             let lists = [used, &left_out, outliers];
             add_square(&mut moments, preparation, mean_function, *square, lists);
         }
@@ -102,12 +106,8 @@ pub(super) async fn classify(
         .for_each(|part| add_scaled(&mut moments.sums, 1.0, part));
     let brightness_share =
         |i: usize| 1.0 - moments.unexplained(i, &[BRIGHTNESS]) / moments.energy(i);
-    let mut shares: Vec<f64> = used
-        .iter()
-        .map(|&l| brightness_share(FIRST_PHOTOGRAPH + l))
-        .collect();
-    linalg::sort(&mut shares);
-    let typical_share = shares[shares.len() / 2];
+    let shares = used.iter().map(|&l| brightness_share(FIRST_PHOTOGRAPH + l));
+    let typical_share = median(&shares.collect::<Vec<f64>>());
     let fault = |(i, &l): (usize, &usize)| {
         let target = FIRST_PHOTOGRAPH + count + i;
         let own = FIRST_PHOTOGRAPH + l;

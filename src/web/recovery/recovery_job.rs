@@ -1,7 +1,6 @@
 //! One recovery: from measurements to a file.
 
 use std::io::{self, ErrorKind};
-use std::mem;
 
 use js_sys::Function;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -252,13 +251,13 @@ impl Recovery {
         let doubts = given.map(|(_, name)| name.to_owned());
         let faults = self.recovery().faults();
         let shots = &self.input.provenance.shots;
-        let is_moved = |fault: &PhotographFault| matches!(fault, PhotographFault::Moved { .. });
-        let moved = faults.iter().filter(|(_, fault)| is_moved(fault)).count();
-        let mut is_first = true;
-        let warnings = faults.iter().filter_map(|&(l, fault)| {
-            let is_repeated = is_moved(&fault) && !mem::take(&mut is_first);
-            (!is_repeated).then(|| fault_warning(shots, l, fault, moved))
-        });
+        let mut moved = faults.iter().filter(|(_, fault)| fault.is_moved());
+        let (count, first) = (moved.clone().count(), moved.next());
+        // Of those that moved, the first stands for all.
+        let told = faults
+            .iter()
+            .filter(|fault| !fault.1.is_moved() || first == Some(fault));
+        let warnings = told.map(|&(l, fault)| fault_warning(shots, l, fault, count));
         doubts.chain(warnings).collect()
     }
 }
