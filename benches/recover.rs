@@ -120,6 +120,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TileTransportFunctions>) {
         full_scale: vec![1.0; PATTERNS],
         rows: CameraRowSet::all(camera.height),
         photos: pictures,
+        flood: None,
         noise: NoiseModel::from_dark(&dark, camera.width, code),
     };
     measurements.noise = NoiseModel::with_gain_from(&measurements);

@@ -59,6 +59,8 @@ pub struct Measurements {
     pub rows: CameraRowSet,
     /// These rows of the `L` photographs.
     pub photos: Vec<LinearPhoto>,
+    /// These rows of the photograph with all light elements lit, if there is one. Nothing is recovered from it.
+    pub flood: Option<LinearPhoto>,
     /// Variance of the samples.
     pub noise: NoiseModel,
 }
@@ -83,6 +85,12 @@ impl Measurements {
         pixel.map_or(f64::NAN, |sample| f64::from(sample[c]))
     }
 
+    /// Channel `c` of a pixel of the flood photograph; NaN if saturated, not loaded or without such a photograph.
+    pub fn flood_sample(&self, pixel: CameraPixel, c: usize) -> f64 {
+        let sample = self.pixel_index(pixel).zip(self.flood.as_ref());
+        sample.map_or(f64::NAN, |(n, flood)| f64::from(flood[n][c]))
+    }
+
     /// Index of a pixel in `photos`, if its row is loaded.
     pub fn pixel_index(&self, pixel: CameraPixel) -> Option<usize> {
         let row = self.rows.index_of(pixel.y)?;
@@ -93,6 +101,7 @@ impl Measurements {
     pub fn clear_rows(&mut self) {
         self.rows = CameraRowSet::from_strips([]);
         self.photos.fill(LinearPhoto::new());
+        self.flood = None;
     }
 
     /// Whether all pixels of a tile are loaded.

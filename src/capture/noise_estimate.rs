@@ -278,6 +278,7 @@ mod tests {
                 .collect(),
             rows: CameraRowSet::all(camera.height),
             photos: photos.map(less_dark).collect(),
+            flood: None,
             noise,
         }
     }

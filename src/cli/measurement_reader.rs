@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::progress;
 use crate::capture::{
-    CameraRowSet, CaptureError, CaptureFolder, DarkFrame, Measurements, NoiseModel,
+    CameraRowSet, CaptureError, CaptureFolder, DarkFrame, LinearPhoto, Measurements, NoiseModel,
     PhotographRowReader,
 };
 use crate::job_executor::Executor;
@@ -28,6 +28,17 @@ pub fn read_patterns(
     let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
     let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
     Ok(folder.empty_measurements(shots, patterns, correspondence, dark))
+}
+
+/// Reads `rows` of a photograph, and the rest of the file, which checks that it is whole.
+pub fn read_sample_of(
+    mut photo: PhotographRowReader<'_>,
+    rows: &CameraRowSet,
+) -> Result<LinearPhoto> {
+    let mut samples = LinearPhoto::new();
+    photo.read(rows, &mut samples)?;
+    photo.finish()?;
+    Ok(samples)
 }
 
 /// The opened photographs of some shots.

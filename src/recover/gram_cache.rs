@@ -269,6 +269,7 @@ mod tests {
             full_scale: (0..PATTERNS).map(|l| 0.5 + 0.2 * l as f32).collect(),
             rows: CameraRowSet::all(LIGHT.height),
             photos: Vec::new(),
+            flood: None,
             noise: NoiseModel {
                 gain: [0.0; CHANNELS],
                 floor: [0.0; CHANNELS],

@@ -55,7 +55,13 @@ impl Method {
     pub fn tile_bytes(self, window: Window, patterns: usize) -> usize {
         // Learned tiles may be blended with least squares.
         let learned = self.if_learned(learned::tile_bytes(window));
-        learned.max(PixelwiseRecovery::max_tile_bytes(window, patterns))
+        let solver = learned.max(PixelwiseRecovery::max_tile_bytes(window, patterns));
+        solver + photometry::max_tile_bytes(patterns, self.if_learned(learned::MAX_HALO))
+    }
+
+    /// Upper bound on the memory that resampled samples of so many photographs take while a recovery is prepared, in bytes.
+    pub fn resampled_bytes(self, photographs: usize) -> usize {
+        photometry::max_prepared_bytes(photographs)
     }
 
     /// Largest rank of the basis that factored tiles share.
@@ -65,7 +71,7 @@ impl Method {
 
     /// Largest distance from a tile, in camera pixels, of measurements that the tile depends on.
     pub fn max_halo(self) -> u32 {
-        self.if_learned(learned::MAX_HALO)
+        self.if_learned(learned::MAX_HALO) + photometry::HALO
     }
 
     /// The basis of [`Bpdn`](Self::Bpdn).

@@ -44,7 +44,7 @@ pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;
 pub use method::Method;
 pub use nnls::Nnls;
-pub use photometry::{LinearCorrection, PhotographFault};
+pub use photometry::{PhotographCorrection, PhotographFault};
 pub use prepared_recovery::{PreparedRecovery, RecoverySettings};
 pub use sampling::MIN_PATTERNS;
 pub use window_size::{TailEstimate, WindowSizeEstimate};

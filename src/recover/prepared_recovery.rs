@@ -10,13 +10,19 @@ use super::learned::LearnedRecovery;
 use super::mean_function;
 use super::method::Method;
 use super::pattern_check;
-use super::photometry::{self, CalibratedMeasurements, LinearCorrection, PhotographFault};
+use super::photometry::{
+    self, CalibratedMeasurements, PhotographCorrection, PhotographFault, ResampledPhotographs,
+    ResamplingInput,
+};
 use super::pixelwise::PixelwiseRecovery;
 use super::preparation_input::{self, RecoveryPreparationInput};
-use super::sampling::MIN_PATTERNS;
+use super::sampling::{self, MIN_PATTERNS};
 use crate::capture::Measurements;
 use crate::job_executor::Executor;
 use crate::transport::{Basis, FloatTile, Geometry, TileRect, Window};
+
+/// Root mean square shift, in camera pixels, that costs accuracy although it is corrected.
+const MIN_TREMBLING: f64 = 0.05;
 
 /// The options of a recovery.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +40,9 @@ pub struct RecoverySettings {
 pub struct PreparedRecovery {
     geometry: Geometry,
     split: HoldoutSplit,
-    corrections: Vec<LinearCorrection>,
+    corrections: Vec<PhotographCorrection>,
+    /// What photographs are resampled with, `[slot]`.
+    mean_function: Vec<f64>,
     solver: TileSolver,
     /// The photographs that are left out. Not needed to recover tiles elsewhere.
     #[serde(skip)]
@@ -76,11 +84,19 @@ impl PreparedRecovery {
         };
         let mut mean = mean_function::mean_function(&preparation).await?;
         let photometry = photometry::estimate(&preparation, &mean).await?;
-        let corrections = photometry.corrections.clone();
         let is_left_out = |l: usize| photometry.faults.iter().any(|fault| fault.0 == l);
         let split = HoldoutSplit::without(&measurements.patterns, is_left_out);
+        let input = ResamplingInput {
+            measurements,
+            corrections: &photometry.corrections,
+            geometry: &geometry,
+            mean_function: &photometry.mean_function,
+            used: &split.all,
+        };
+        let resampled = ResampledPhotographs::of_picture(input);
+        let calibrated = CalibratedMeasurements::new(measurements, &photometry.corrections);
         let preparation = RecoveryPreparationInput {
-            measurements: &CalibratedMeasurements::new(measurements, &corrections),
+            measurements: &calibrated.with_resampled(resampled.as_ref()),
             split: &split,
             ..preparation
         };
@@ -102,9 +118,10 @@ impl PreparedRecovery {
         let mut recovery = Self {
             geometry,
             split: split.clone(),
-            corrections: photometry.corrections,
+            corrections: photometry.corrections.clone(),
+            mean_function: photometry.mean_function.clone(),
             solver,
-            faults: photometry.faults,
+            faults: photometry.faults.clone(),
             holdout_validation: None,
         };
         let measurements = preparation.measurements;
@@ -141,8 +158,24 @@ impl PreparedRecovery {
     }
 
     /// Corrections of the photographs, one for each; none at all if no photograph needs one.
-    pub fn corrections(&self) -> &[LinearCorrection] {
+    pub fn corrections(&self) -> &[PhotographCorrection] {
         &self.corrections
+    }
+
+    /// Root mean square of the shifts between the photographs that are used, in camera pixels; `None` if none is worth a
+    /// warning.
+    pub fn trembling(&self) -> Option<f64> {
+        let shifts = self
+            .split
+            .all
+            .iter()
+            .filter_map(|&l| self.corrections.get(l));
+        let squares = shifts.map(|correction| {
+            let [x, y] = correction.shift;
+            x * x + y * y
+        });
+        let shift = (squares.sum::<f64>() / self.split.all.len() as f64).sqrt();
+        (shift > MIN_TREMBLING).then_some(shift)
     }
 
     /// The photographs that are left out, by their indices in the measurements, with the fault that each looks like.
@@ -157,6 +190,11 @@ impl PreparedRecovery {
 
     /// Distance from a tile, in camera pixels, of the measurements that the tile depends on.
     pub fn halo(&self) -> u32 {
+        let has_shifts = self.corrections.iter().any(|c| c.is_shifted());
+        self.solver_halo() + if has_shifts { photometry::HALO } else { 0 }
+    }
+
+    fn solver_halo(&self) -> u32 {
         match &self.solver {
             TileSolver::Learned(learned) => learned.halo(),
             TileSolver::Pixelwise(_) => 0,
@@ -166,7 +204,17 @@ impl PreparedRecovery {
     /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other rows of the same
     /// capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> FloatTile {
-        let measurements = &CalibratedMeasurements::new(measurements, &self.corrections);
+        let input = ResamplingInput {
+            measurements,
+            corrections: &self.corrections,
+            geometry: &self.geometry,
+            mean_function: &self.mean_function,
+            used: &self.split.all,
+        };
+        let region = sampling::with_margin(measurements, rect, self.solver_halo());
+        let resampled = ResampledPhotographs::of_region(input, region);
+        let calibrated = CalibratedMeasurements::new(measurements, &self.corrections);
+        let measurements = &calibrated.with_resampled(resampled.as_ref());
         match &self.solver {
             TileSolver::Learned(learned) => learned.tile(measurements, &self.split, rect),
             TileSolver::Pixelwise(solver) => {

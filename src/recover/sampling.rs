@@ -86,6 +86,25 @@ pub(super) fn pixels_by_window(
     windows
 }
 
+/// `rect` with a border of `margin` pixels, where the picture has such pixels and their measurements are loaded.
+pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u32) -> TileRect {
+    let camera = measurements.camera;
+    let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);
+    let is_loaded = |y: &u32| measurements.rows.index_of(*y).is_some();
+    let x = rect.x.saturating_sub(margin);
+    let above = (1..=margin.min(rect.y)).take_while(|d| is_loaded(&(rect.y - d)));
+    let y = rect.y - above.count() as u32;
+    let below = (bottom..camera.height.min(bottom + margin)).take_while(is_loaded);
+    TileRect {
+        x,
+        y,
+        extent: Extent::new(
+            (right + margin).min(camera.width) - x,
+            bottom + below.count() as u32 - y,
+        ),
+    }
+}
+
 /// The patterns of `pattern_indices` under which none of the pixels and channels is saturated; all of them if those are
 /// fewer than [`MIN_PATTERNS`].
 pub(super) fn unsaturated(

@@ -89,6 +89,8 @@ pub(super) struct SyntheticCapture {
     pub measurements: Measurements,
     /// Standard deviation of every element of a pixel's function, relative to the element of `function`.
     variation: f64,
+    /// Brightness of each pixel.
+    brightness: fn(usize) -> f64,
 }
 
 impl SyntheticCapture {
@@ -98,6 +100,18 @@ impl SyntheticCapture {
 
     /// The same with functions that vary from pixel to pixel.
     pub fn with_variation(patterns: usize, variation: f64) -> Self {
+        Self::with_brightness(patterns, variation, |n| 0.1 + 0.02 * (n * 37 % 29) as f64)
+    }
+
+    /// Pixels that all have one function, with a brightness that varies smoothly over the picture.
+    pub fn smooth(patterns: usize) -> Self {
+        Self::with_brightness(patterns, 0.0, |n| {
+            let (x, y) = ((n % 32) as f64, (n / 32) as f64);
+            0.4 + 0.2 * (0.9 * x).sin() * (0.7 * y).cos() + 0.1 * (0.5 * x + 0.8 * y).sin()
+        })
+    }
+
+    fn with_brightness(patterns: usize, variation: f64, brightness: fn(usize) -> f64) -> Self {
         let square = |side| Extent::new(side, side);
         let geometry = Geometry {
             camera: square(32),
@@ -119,6 +133,7 @@ impl SyntheticCapture {
         let mut capture = Self {
             geometry,
             variation,
+            brightness,
             function: weights.iter().map(|w| w / sum).collect(),
             measurements: Measurements {
                 camera: geometry.camera,
@@ -128,6 +143,7 @@ impl SyntheticCapture {
                 patterns,
                 rows: CameraRowSet::all(geometry.camera.height),
                 photos: Vec::new(),
+                flood: None,
                 noise: NoiseModel {
                     gain: [0.0; CHANNELS],
                     floor: [0.0; CHANNELS],
@@ -155,7 +171,7 @@ impl SyntheticCapture {
         let mut next = uniform(13);
         for (i, tau) in functions.tau.iter_mut().enumerate() {
             let (n, slot) = (i / self.function.len(), i % self.function.len());
-            let brightness = 0.1 + 0.02 * (n * 37 % 29) as f64;
+            let brightness = (self.brightness)(n);
             let variation = 1.0 + self.variation * 12f64.sqrt() * next();
             let value = factor * brightness * variation * self.function[slot];
             *tau = [1.0, 0.8, 0.5].map(|c| (c * value) as f32);

@@ -52,6 +52,7 @@ impl SimulatedCapture<'_> {
             full_scale: vec![1.0; count],
             rows: CameraRowSet::all(geometry.camera.height),
             photos: self.photographs(&codes, executor),
+            flood: None,
             noise: NoiseModel::from_dark(&self.dark(), geometry.camera.width, code),
         };
         measurements.noise = NoiseModel::with_gain_from(&measurements);
@@ -167,6 +168,7 @@ pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
         full_scale: measurements.full_scale[..count].to_vec(),
         rows: measurements.rows.clone(),
         photos: measurements.photos[..count].to_vec(),
+        flood: measurements.flood.clone(),
         ..*measurements
     };
     first.noise = NoiseModel::with_gain_from(&first);

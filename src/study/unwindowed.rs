@@ -118,6 +118,7 @@ mod tests {
             full_scale: vec![1.0; 10],
             rows: CameraRowSet::all(1),
             photos: patterns.iter().map(seen).collect(),
+            flood: None,
             noise: NoiseModel {
                 gain: [0.0; CHANNELS],
                 floor: [0.0; CHANNELS],

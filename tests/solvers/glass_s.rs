@@ -70,6 +70,7 @@ pub fn measurements() -> Measurements {
         full_scale: vec![1.0; SHOTS.len()],
         rows: CameraRowSet::all(camera.height),
         photos: SHOTS.iter().map(|(_, png)| picture(png)).collect(),
+        flood: None,
         noise: NoiseModel::from_dark(&dark, camera.width, code),
     };
     measurements.noise = NoiseModel::with_gain_from(&measurements);

@@ -253,6 +253,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             full_scale: full_scale.collect(),
             rows: CameraRowSet::from_strips([]),
             photos: vec![LinearPhoto::new(); shots.len()],
+            flood: None,
             noise: dark.noise,
         }
     }

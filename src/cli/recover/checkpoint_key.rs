@@ -135,7 +135,10 @@ pub fn recovery_fingerprint(recovery: &PreparedRecovery) -> u32 {
     let snr = validation.and_then(HoldoutValidation::snr);
     let chosen = [common_mode, snr.map(|snr| snr.0)].map(|value| value.unwrap_or(f64::NAN));
     let corrections = recovery.corrections().iter();
-    let corrections = corrections.flat_map(|correction| [correction.scale, correction.offset]);
+    let corrections = corrections.flat_map(|correction| {
+        let [x, y] = correction.shift;
+        [correction.scale, correction.offset, x, y]
+    });
     let left_out = recovery.faults().iter().map(|fault| fault.0 as f64);
     let basis = recovery.basis().into_iter().flat_map(|b| b.kernels.iter());
     let bytes: Vec<u8> = geometry

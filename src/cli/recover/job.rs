@@ -13,7 +13,7 @@ use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
 use super::messages::{self, StrictError, UnusableError, Warning};
 use super::report::{RecoverReport, photograph_reports};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements};
-use crate::cli::measurement_reader::{MeasurementReader, read_patterns};
+use crate::cli::measurement_reader::{MeasurementReader, read_patterns, read_sample_of};
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
@@ -63,7 +63,7 @@ impl RecoverJob<'_> {
     /// Recovers all tiles and writes the file.
     pub fn run(&self) -> Result<RecoverReport> {
         let dark = self.folder.read_dark()?;
-        self.folder.open_flood(&dark)?; // `evaluate` needs it: fail early if it is missing
+        let flood = self.folder.open_flood(&dark)?;
         let gray_code_shots = self.folder.manifest().graycode.len();
         let gray_code_rows = self.plan.gray_code_rows(gray_code_shots);
         let mut measurements = read_patterns(self.folder, &dark, self.shots, &gray_code_rows)?;
@@ -74,6 +74,12 @@ impl RecoverJob<'_> {
         let checkpoint = Mutex::new(checkpoint);
         let rows = self.plan.sample_rows();
         let saturated = reader.read_sample(&mut measurements, &rows, self.cores);
+        let saturated = saturated.and_then(|saturated| {
+            measurements.flood = flood
+                .map(|flood| read_sample_of(flood, &rows))
+                .transpose()?;
+            Ok(saturated)
+        });
         let report = saturated.and_then(|n| self.recover(measurements, dark, n, &checkpoint));
         match &report {
             Ok(_) => lock(&checkpoint).delete_on_drop = true,

@@ -9,7 +9,7 @@ use crate::export::{
     MIN_PLAUSIBLE_SNR, PreparedExport, TooFewShots, TooLittleMemory, has_implausible_saturation,
     saturated_percent,
 };
-use crate::recover::{LinearCorrection, PhotographFault, PreparedRecovery, TailEstimate};
+use crate::recover::{PhotographCorrection, PhotographFault, PreparedRecovery, TailEstimate};
 use crate::transport::Decibels;
 
 /// Least standard deviation of exposures, and least stray light, that is worth a note.
@@ -184,7 +184,7 @@ pub fn photographs(
         if !more.is_empty() {
             let names = moved.iter().map(|(l, _)| listed[shots[*l]].photo.clone());
             summary.message = format!(
-                "{} photographs are left out, as the camera or the object had moved by more than a tenth of a \
+                "{} photographs are left out, as the camera or the object had moved by more than a third of a \
                  pixel: {}",
                 moved.len(),
                 join_first(names)
@@ -192,14 +192,27 @@ pub fn photographs(
         }
         warnings.push(summary);
     }
+    warnings.extend(trembling(recovery));
     warnings
+}
+
+/// Warns of a camera that moved between the photographs that are used.
+fn trembling(recovery: &PreparedRecovery) -> Option<Warning> {
+    let shift = recovery.trembling()?;
+    Some(Warning {
+        code: "camera-trembled",
+        message: format!(
+            "the camera trembled: pictures are shifted by {shift:.2} pixels (root mean square) from one photograph to \
+             another. This is corrected, but costs accuracy; fasten the camera, or wait before each photograph"
+        ),
+    })
 }
 
 /// Notes exposures and stray light that are corrected.
 fn note_corrections<'a>(recovery: &PreparedRecovery, name: &dyn Fn(usize) -> &'a String) {
     let is_used = |l: usize| recovery.faults().iter().all(|fault| fault.0 != l);
     let corrections = recovery.corrections().iter().enumerate();
-    let corrections: Vec<(usize, &LinearCorrection)> =
+    let corrections: Vec<(usize, &PhotographCorrection)> =
         corrections.filter(|(l, _)| is_used(*l)).collect();
     if corrections.is_empty() {
         return;

@@ -7,7 +7,10 @@ use super::args::RecoverArgs;
 use super::messages::Warning;
 use crate::capture::{CaptureFolder, Manifest, NoiseModel};
 use crate::cli::report::{format_bytes, format_shots, print_line};
-use crate::recover::{CommonModeWeight, LinearCorrection, Method, PreparedRecovery, SparsityBasis};
+use crate::recover::{
+    CommonModeWeight, Method, PhotographCorrection, PhotographFault, PreparedRecovery,
+    SparsityBasis,
+};
 use crate::transport::Decibels;
 
 /// Fields of `recover --json`; see docs/capture.md.
@@ -54,6 +57,8 @@ pub struct PhotographReport {
     pub gain: f64,
     /// Light in the photograph that does not come from the light plane, as a share of white.
     pub stray_light: f64,
+    /// Shift of the picture in camera pixels, to the right and down.
+    pub shift: [f64; 2],
     /// "used", or the code of the fault for which it is left out.
     pub verdict: &'static str,
 }
@@ -66,13 +71,18 @@ pub fn photograph_reports(
 ) -> Vec<PhotographReport> {
     let report = |(l, &shot): (usize, &usize)| {
         let correction = recovery.corrections().get(l).copied();
-        let correction = correction.unwrap_or(LinearCorrection::IDENTITY);
+        let correction = correction.unwrap_or(PhotographCorrection::IDENTITY);
         let fault = recovery.faults().iter().find(|fault| fault.0 == l);
+        let shift = match fault {
+            Some((_, PhotographFault::Moved { shift })) => *shift,
+            _ => correction.shift,
+        };
         PhotographReport {
             shot,
             photo: folder.manifest().shots[shot].photo.clone(),
             gain: correction.gain(),
             stray_light: correction.stray_light(),
+            shift,
             verdict: fault.map_or("used", |(_, fault)| fault.code()),
         }
     };

@@ -15,7 +15,7 @@ use crate::recover::common_mode_weight::CommonModeWeight;
 use crate::recover::normal_equations::{EquationWeights, WeightedColumns};
 use crate::recover::photometry::CalibratedMeasurements;
 use crate::recover::sampling::{PixelsSharingWindow, pixels_by_window, usable_samples};
-use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry, TileRect};
+use crate::transport::{CHANNELS, CameraPixel, Geometry, TileRect};
 
 /// Sub-element positions along one axis. With two camera pixels for each light element, neighbours lie in different
 /// halves of it and see different parts of their window.
@@ -196,29 +196,6 @@ pub(super) fn min_reliable_brightness(brightnesses: &[f64]) -> MinReliableBright
         let bright = of_channel.get(of_channel.len() * BRIGHT_PERCENTILE / 100);
         MIN_RELATIVE_BRIGHTNESS * bright.copied().unwrap_or(0.0)
     })
-}
-
-/// `rect` with a border of `margin` pixels, where the picture has such pixels and their measurements are loaded.
-pub(super) fn with_margin(
-    measurements: &CalibratedMeasurements<'_>,
-    rect: TileRect,
-    margin: u32,
-) -> TileRect {
-    let camera = measurements.camera;
-    let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);
-    let is_loaded = |y: &u32| measurements.rows.index_of(*y).is_some();
-    let x = rect.x.saturating_sub(margin);
-    let above = (1..=margin.min(rect.y)).take_while(|d| is_loaded(&(rect.y - d)));
-    let y = rect.y - above.count() as u32;
-    let below = (bottom..camera.height.min(bottom + margin)).take_while(is_loaded);
-    TileRect {
-        x,
-        y,
-        extent: Extent::new(
-            (right + margin).min(camera.width) - x,
-            bottom + below.count() as u32 - y,
-        ),
-    }
 }
 
 /// The responses of the basis on one window, weighted, to one set of L patterns.

@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::basis::LearnedBasis;
-use super::equations::{MinReliableBrightness, ObservationEquations, with_margin};
+use super::equations::{MinReliableBrightness, ObservationEquations};
 use super::neighbour_prior::NeighbourPrior;
 use super::nonnegativity::NonNegativityPenalty;
 use super::posterior::PosteriorSolver;
@@ -17,6 +17,7 @@ use crate::linalg::vectorise;
 use crate::recover::holdout_split::HoldoutSplit;
 use crate::recover::photometry::CalibratedMeasurements;
 use crate::recover::prediction;
+use crate::recover::sampling::with_margin;
 use crate::transport::{CHANNELS, FloatTile, Geometry, TileRect, TileTransportFunctions};
 
 /// Everything that training learns.

@@ -123,6 +123,7 @@ fn photograph(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measuremen
         full_scale: vec![1.0; patterns],
         rows: CameraRowSet::all(SIDE),
         photos: pictures,
+        flood: None,
         noise: NoiseModel {
             gain: [0.0; CHANNELS],
             floor: [1e-8; CHANNELS],

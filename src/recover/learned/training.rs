@@ -9,7 +9,7 @@
 //! 3. [`RecoveryPreparationInput::select_neighbour_prior`] compares the errors on held-out patterns with and without it.
 
 use super::basis::LearnedBasis;
-use super::equations::{ObservationEquations, with_margin};
+use super::equations::ObservationEquations;
 use super::inference::LearnedModel;
 use super::initial_prior::{MAX_INITIAL_RANK, initial_prior, principal_axes, truncate_basis};
 use super::neighbour_prior::NeighbourPrior;
@@ -21,7 +21,7 @@ use crate::job_executor::{Cancelled, Executor};
 use crate::recover::error::RecoverError;
 use crate::recover::mean_function;
 use crate::recover::preparation_input::RecoveryPreparationInput;
-use crate::recover::sampling::spread_squares;
+use crate::recover::sampling::{spread_squares, with_margin};
 use crate::transport::{TileRect, Window};
 
 /// Ranks to choose from; each fills vector registers together with the mean function.

@@ -1,30 +1,39 @@
-//! Measurements with every photograph corrected for its exposure and its stray light.
+//! Measurements with every photograph corrected for its exposure, its stray light and its place.
 
 use std::ops::Deref;
 
 use serde::{Deserialize, Serialize};
 
+use super::resampling::ResampledPhotographs;
 use crate::capture::Measurements;
 use crate::transport::CameraPixel;
 
-/// Makes a photograph's samples those of a photograph without stray light, at the exposure of the others:
-/// `scale · y + offset`.
+/// Makes a photograph's samples those of a photograph without stray light, at the exposure and from the place of the
+/// others: `scale · y + offset`, [resampled](super::resampling) where the picture is shifted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LinearCorrection {
+pub struct PhotographCorrection {
     /// Inverse of the photograph's gain relative to the others.
     pub scale: f64,
     /// Added after scaling, in units of the measurement.
     pub offset: f64,
+    /// Shift of the picture in camera pixels, to the right and down.
+    pub shift: [f64; 2],
 }
 
-impl LinearCorrection {
+impl PhotographCorrection {
     /// Changes nothing.
     pub const IDENTITY: Self = Self {
         scale: 1.0,
         offset: 0.0,
+        shift: [0.0; 2],
     };
 
-    /// The corrected sample.
+    /// Whether the picture is shifted.
+    pub fn is_shifted(self) -> bool {
+        self.shift != [0.0; 2]
+    }
+
+    /// The sample, corrected for exposure and stray light.
     pub fn apply(self, y: f64) -> f64 {
         self.scale * y + self.offset
     }
@@ -50,15 +59,24 @@ impl LinearCorrection {
 pub(in crate::recover) struct CalibratedMeasurements<'a> {
     measurements: &'a Measurements,
     /// One for each pattern, or none at all.
-    corrections: &'a [LinearCorrection],
+    corrections: &'a [PhotographCorrection],
+    /// The samples of photographs that are shifted, and of the others.
+    resampled: Option<&'a ResampledPhotographs<'a>>,
 }
 
 impl<'a> CalibratedMeasurements<'a> {
-    pub fn new(measurements: &'a Measurements, corrections: &'a [LinearCorrection]) -> Self {
+    /// Measurements corrected for exposures and stray light.
+    pub fn new(measurements: &'a Measurements, corrections: &'a [PhotographCorrection]) -> Self {
         Self {
             measurements,
             corrections,
+            resampled: None,
         }
+    }
+
+    /// The same measurements, corrected for shifts as well; only those of the resampled region can be used.
+    pub fn with_resampled(self, resampled: Option<&'a ResampledPhotographs<'a>>) -> Self {
+        Self { resampled, ..self }
     }
 
     /// Measurements as they are.
@@ -66,13 +84,16 @@ impl<'a> CalibratedMeasurements<'a> {
         Self::new(measurements, &[])
     }
 
-    fn correction(&self, l: usize) -> LinearCorrection {
+    fn correction(&self, l: usize) -> PhotographCorrection {
         let correction = self.corrections.get(l).copied();
-        correction.unwrap_or(LinearCorrection::IDENTITY)
+        correction.unwrap_or(PhotographCorrection::IDENTITY)
     }
 
     /// Channel `c` of a pixel under pattern `l`; NaN if saturated or not loaded.
     pub fn sample(&self, l: usize, pixel: CameraPixel, c: usize) -> f64 {
+        if let Some(resampled) = self.resampled {
+            return resampled.sample(l, pixel, c);
+        }
         let y = self.measurements.sample(l, pixel, c);
         self.correction(l).apply(y)
     }

@@ -9,7 +9,10 @@
 //! fixed, as brightness and functions absorb them. The leak is the light from outside the window relative to brightness, nearly constant, the same for all pixels: it must
 //! not pass for stray light, which does not depend on brightness.
 
-use super::window_covariance::{ScaledPixel, WindowCovariance, WindowModel};
+use super::CalibratedMeasurements;
+use super::resampling::{ResampledPhotographs, ResamplingInput};
+use super::window_covariance::{ScaledPixel, WindowCovariance, WindowModel, gradients};
+use crate::capture::Measurements;
 use crate::job_executor::{Cancelled, Executor, PARTS, share_of_jobs};
 use crate::linalg::{self, add_scaled, dot, vectorise};
 use crate::recover::preparation_input::RecoveryPreparationInput;
@@ -23,6 +26,11 @@ const GAUGE_WEIGHT: f64 = 1e3;
 /// Added to the mean squared deviation of a pixel's photographs, whose inverse weights the pixel: how far functions are
 /// from the mean function differs between parts of an object.
 const MIN_DEVIATION: f64 = 0.1;
+/// Distance, in camera pixels, of the samples whose difference is a gradient.
+const GRADIENT_MARGIN: u32 = 1;
+/// Pixels of the picture for each square up to which the picture is resampled, rather than each square with its own
+/// border.
+const MAX_PIXELS_PER_SQUARE: usize = 160;
 /// Ridge relative to the equations' diagonal: a dark photograph has no equations of its own.
 const RIDGE: f64 = 1e-8;
 
@@ -32,6 +40,9 @@ pub(super) struct CorrectionStep {
     pub shifts: [Vec<f64>; 2],
     /// Standard errors of the same.
     pub shift_errors: [Vec<f64>; 2],
+    /// Shift of the flood photograph's picture relative to those of the others as they are corrected, in camera pixels;
+    /// `None` without one.
+    pub flood_shift: Option<[f64; 2]>,
     /// Change of each photograph's scale and offset, `[2][L]`.
     pub steps: [Vec<f64>; 2],
     /// Standard errors of the same.
@@ -45,27 +56,42 @@ pub(super) struct CorrectionStep {
     pub deviations: Vec<f64>,
 }
 
-/// Fits the corrections of the photographs `pattern_indices` on one window of each square; `mean_function` is `[slot]`.
-/// `None` if too little is measured.
+/// Fits the changes of the corrections of the photographs used, on one window of each square. `None` if too little is
+/// measured.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub(super) async fn fit(
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
-    mean_function: &[f64],
+    input: ResamplingInput<'_>,
     squares: &[TileRect],
-    pattern_indices: &[usize],
 ) -> Result<Option<CorrectionStep>, Cancelled> {
-    let (executor, patterns) = (preparation.executor, pattern_indices.len());
+    let (executor, patterns) = (preparation.executor, input.used.len());
+    let pixels = input.measurements.rows.count() * input.measurements.camera.width as usize;
+    let is_small = pixels <= squares.len() * MAX_PIXELS_PER_SQUARE;
+    let picture = is_small
+        .then(|| ResampledPhotographs::of_picture(input))
+        .flatten();
     let sum_part = |part: usize| {
         let mut sums = CalibrationSums::zeros(patterns);
         for square in &squares[share_of_jobs(squares.len(), part, PARTS)] {
             sums.scores
                 .resize(sums.scores.len() + unknowns(patterns), 0.0);
+            let region = sampling::with_margin(input.measurements, *square, GRADIENT_MARGIN);
+            let resampled = match &picture {
+                Some(_) => None,
+                None => ResampledPhotographs::of_region(input, region),
+            };
+            let measurements = CalibratedMeasurements::new(input.measurements, input.corrections)
+                .with_resampled(picture.as_ref().or(resampled.as_ref()));
+            let preparation = &preparation.with(&measurements);
             for_largest_window(preparation, *square, |origin, pixels| {
                 vectorise(
                     #[cfg_attr(target_arch = "x86_64", inline(always))]
-                    || sums.add_window(preparation, mean_function, pattern_indices, origin, pixels),
+                    || {
+                        let (mean_function, used) = (input.mean_function, input.used);
+                        sums.add_window(preparation, mean_function, used, origin, pixels);
+                    },
                 );
             });
         }
@@ -110,9 +136,15 @@ struct CalibrationSums {
     count: f64,
     /// Energies of leave-one-out residuals and of differences between photographs.
     energies: [f64; 2],
+    /// Regression of the flood photograph: sums of products of its [columns](FLOOD_COLUMNS).
+    flood: Vec<f64>,
     /// Negative gradient of each square, `[square, 4L + 1]`.
     scores: Vec<f64>,
 }
+
+/// Columns of the regression of the flood photograph: its prediction, gradients to the right and down, a constant, and
+/// the photograph.
+const FLOOD_COLUMNS: usize = 5;
 
 /// Kinds of unknowns whose columns differ from photograph to photograph: scales and shifts.
 const VARYING: usize = 3;
@@ -129,6 +161,7 @@ impl CalibrationSums {
             deviations: vec![0.0; patterns],
             count: 0.0,
             energies: [0.0; 2],
+            flood: vec![0.0; FLOOD_COLUMNS * FLOOD_COLUMNS],
             scores: Vec::new(),
         }
     }
@@ -136,7 +169,14 @@ impl CalibrationSums {
     /// Everything in one list.
     fn into_values(self) -> Vec<f64> {
         let energies = vec![self.count, self.energies[0], self.energies[1]];
-        [self.hessian, self.deviations, energies, self.scores].concat()
+        [
+            self.hessian,
+            self.deviations,
+            energies,
+            self.flood,
+            self.scores,
+        ]
+        .concat()
     }
 
     /// Adds the list of another part, whose squares follow.
@@ -147,7 +187,9 @@ impl CalibrationSums {
         add_scaled(&mut self.deviations, 1.0, deviations);
         self.count += rest[0];
         add_scaled(&mut self.energies, 1.0, &rest[1..3]);
-        self.scores.extend_from_slice(&rest[3..]);
+        let (flood, scores) = rest[3..].split_at(self.flood.len());
+        add_scaled(&mut self.flood, 1.0, flood);
+        self.scores.extend_from_slice(scores);
     }
 
     /// Adds a window to the sums and to the last square's score.
@@ -173,8 +215,47 @@ impl CalibrationSums {
             let window = model.with_pixels(measurements, pattern_indices, pixels, channels);
             if let Some((window, pixels)) = window {
                 self.add_pixels(&window, &pixels);
+                let flood = WindowModel::of_flood(&preparation.geometry, mean_function, origin);
+                self.add_flood(measurements, &window, &flood, &pixels);
             }
         }
+    }
+
+    /// Adds the flood photograph's pixels to its regression.
+    fn add_flood(
+        &mut self,
+        measurements: &Measurements,
+        window: &WindowCovariance,
+        flood: &WindowModel,
+        pixels: &[ScaledPixel],
+    ) {
+        for scaled in pixels {
+            let sample = |pixel| measurements.flood_sample(pixel, scaled.channel);
+            let measured = sample(scaled.pixel);
+            if measured.is_nan() {
+                continue;
+            }
+            let [right, down] = gradients(measurements.camera, sample, scaled.pixel);
+            let predicted = predict(window, flood, scaled)[0];
+            let columns = [measured, right, down].map(|value| scaled.unit * value);
+            let columns = [predicted, columns[1], columns[2], scaled.unit, columns[0]];
+            for (row, factor) in self.flood.chunks_exact_mut(FLOOD_COLUMNS).zip(columns) {
+                add_scaled(row, factor, &columns);
+            }
+        }
+    }
+
+    /// A shift d changes the flood photograph by `−∇·d`, to first order.
+    fn flood_shift(&self) -> Option<[f64; 2]> {
+        const UNKNOWNS: usize = FLOOD_COLUMNS - 1;
+        let rows = self.flood.chunks_exact(FLOOD_COLUMNS).take(UNKNOWNS);
+        let matrix: Vec<f64> = rows.flat_map(|row| &row[..UNKNOWNS]).copied().collect();
+        let trace: f64 = (0..UNKNOWNS).map(|i| matrix[i * UNKNOWNS + i]).sum();
+        let ridge = RIDGE * trace;
+        let (factor, _) = linalg::cholesky_with_ridge(&matrix, UNKNOWNS, ridge)?;
+        let mut solution = self.flood[UNKNOWNS * FLOOD_COLUMNS..][..UNKNOWNS].to_vec();
+        linalg::cholesky_solve(&factor, &mut solution);
+        (trace > 0.0).then(|| [-solution[1], -solution[2]])
     }
 
     #[cfg_attr(target_arch = "x86_64", inline(always))]
@@ -317,6 +398,7 @@ impl CalibrationSums {
             steps: parts(&step, [0, VARYING]),
             errors: parts(&errors, [0, VARYING]),
             shifts: parts(&step, [1, 2]),
+            flood_shift: self.flood_shift(),
             shift_errors: parts(&errors, [1, 2]),
             mean_offset_error: mean_offset_variance.sqrt(),
             unexplained_share: self.energies[0] / self.energies[1],

@@ -4,7 +4,11 @@
 //! capture takes one step, which finds nothing significant.
 
 use super::equations::{self, CorrectionStep, MAX_PHOTOGRAPHS};
-use super::{CalibratedMeasurements, LinearCorrection, PhotographFault, Photometry, faults};
+use super::resampling::MAX_SHIFT;
+use super::{
+    CalibratedMeasurements, PhotographCorrection, PhotographFault, Photometry, ResamplingInput,
+    faults,
+};
 use crate::job_executor::{Cancelled, Executor};
 use crate::linalg::{self, median};
 use crate::recover::mean_function;
@@ -24,11 +28,21 @@ const OUTLIER_RATIO: f64 = 3.0;
 const WORST_SHARE: f64 = 0.3;
 /// Largest share of the photographs that may be left out.
 const MAX_OUTLIER_SHARE: f64 = 0.2;
-/// Shift in camera pixels that does harm, and the standard errors by which it must be larger. Where standard errors are
-/// large, functions differ too much from the model to tell.
+/// Steps of the shifts.
+const MAX_SHIFT_STEPS: usize = 4;
+/// Root mean square of shifts in camera pixels that does harm.
+const MIN_RMS_SHIFT: f64 = 0.004;
+/// Shift of a single photograph in camera pixels that does harm, and the standard errors by which it must be larger. Where
+/// standard errors are large, functions differ too much from the model to tell.
 const MIN_SHIFT: f64 = 0.1;
 const SHIFT_ERRORS: f64 = 3.0;
 const MAX_SHIFT_ERROR: f64 = 0.05;
+
+/// Distance in camera pixels above which photographs are left out if all others were taken from one place: they would add
+/// less than resampling takes away.
+const MIN_MOVE: f64 = 0.35;
+/// Steps of the shifts of photographs that are tried once more.
+const MAX_READMISSION_STEPS: usize = 2;
 /// Median shift of the other photographs, in camera pixels, up to which the camera was steady.
 const MAX_STEADY_SHIFT: f64 = 0.06;
 /// Largest share of the photographs that may be left out because the camera moved.
@@ -63,17 +77,24 @@ pub(in crate::recover) async fn estimate(
     }
     let mean_function =
         mean_function::smooth(mean_function, preparation.geometry.window.side() as usize);
-    let mut corrections = vec![LinearCorrection::IDENTITY; count];
+    let mut corrections = vec![PhotographCorrection::IDENTITY; count];
     let mut used: Vec<usize> = (0..count).collect();
     let mut outliers: Vec<usize> = Vec::new();
     let mut moved: Vec<(usize, PhotographFault)> = Vec::new();
+    let mut readmitted: Vec<usize> = Vec::new();
+    let mut readmission_steps = 0;
     let max_outliers = (MAX_OUTLIER_SHARE * count as f64) as usize;
-    let mut steps = 0;
+    let (mut steps, mut shift_steps) = (0, 0);
     let last = loop {
         preparation.executor.check_cancelled()?;
-        let calibrated = CalibratedMeasurements::new(measurements, &corrections);
-        let preparation = preparation.with(&calibrated);
-        let step = equations::fit(&preparation, &mean_function, &squares, &used).await?;
+        let input = ResamplingInput {
+            measurements,
+            corrections: &corrections,
+            geometry: &preparation.geometry,
+            mean_function: &mean_function,
+            used: &used,
+        };
+        let step = equations::fit(preparation, input, &squares).await?;
         let Some(step) = step else {
             return Ok(Photometry::default());
         };
@@ -82,28 +103,45 @@ pub(in crate::recover) async fn estimate(
             step.apply(&used, &mut corrections);
             continue;
         }
-        let (mut found, shifted) = (step.outliers(), step.shifted());
-        // After a move, an outlier from the other place is no other object.
-        let may_be_moved = found.is_empty() || !moved.is_empty();
-        let all_moved = moved.len() + shifted.len();
-        if may_be_moved && all_moved as f64 <= MAX_MOVED_SHARE * count as f64 {
-            found.retain(|i| shifted.iter().all(|(other, _)| other != i));
-            let faults = shifted.iter();
-            moved.extend(faults.map(|&(i, shift)| (used[i], PhotographFault::Moved { shift })));
+        if readmission_steps > 0 {
+            readmission_steps -= 1;
+            step.apply_shifts(&used, &mut corrections, |l| readmitted.contains(&l));
+            continue;
         }
-        let is_left_out = |l: &usize| moved.iter().any(|(other, _)| other == l);
-        if found.is_empty() && !used.iter().any(is_left_out) {
-            break step;
+        let found = step.outliers();
+        if found.is_empty() && shift_steps < MAX_SHIFT_STEPS && step.has_shifts() {
+            step.apply_shifts(&used, &mut corrections, |_| true);
+            (steps, shift_steps) = (0, shift_steps + 1);
+        } else if !found.is_empty() {
+            if outliers.len() + found.len() > max_outliers {
+                return Ok(Photometry::default());
+            }
+            outliers.extend(found.iter().map(|&i| used[i]));
+            used.retain(|l| !outliers.contains(l));
+            steps = 0;
+        } else if shift_steps > 0 && readmitted.is_empty() && !outliers.is_empty() {
+            // A photograph from another place may have seemed to be of another object.
+            readmitted = std::mem::take(&mut outliers);
+            used = (0..count)
+                .filter(|l| used.contains(l) || readmitted.contains(l))
+                .collect();
+            readmission_steps = MAX_READMISSION_STEPS;
+        } else {
+            let left_out = moved_photographs(&used, &corrections);
+            let all_moved = moved.len() + left_out.len();
+            if left_out.is_empty() || all_moved as f64 > MAX_MOVED_SHARE * count as f64 {
+                break step;
+            }
+            used.retain(|l| !left_out.contains(l));
+            let fault = |l: usize| PhotographFault::Moved {
+                shift: corrections[l].shift,
+            };
+            moved.extend(left_out.into_iter().map(|l| (l, fault(l))));
+            (steps, shift_steps) = (0, 0);
         }
-        if outliers.len() + found.len() > max_outliers {
-            return Ok(Photometry::default());
-        }
-        outliers.extend(found.iter().map(|&i| used[i]));
-        used.retain(|l| !outliers.contains(l) && !is_left_out(l));
         if used.len() < MIN_USED {
             return Ok(Photometry::default());
         }
-        steps = 0;
     };
     // NaN where photographs do not differ at all.
     if last.unexplained_share.is_nan() || last.unexplained_share > MAX_UNEXPLAINED_SHARE {
@@ -111,11 +149,14 @@ pub(in crate::recover) async fn estimate(
     }
     for l in 0..count {
         if !used.contains(&l) {
-            corrections[l] = LinearCorrection::IDENTITY;
+            corrections[l] = PhotographCorrection::IDENTITY;
         }
     }
     last.keep_significant(&used, &mut corrections);
-    if corrections.iter().all(|c| *c == LinearCorrection::IDENTITY) {
+    if corrections
+        .iter()
+        .all(|c| *c == PhotographCorrection::IDENTITY)
+    {
         corrections.clear();
     }
     let calibrated = CalibratedMeasurements::new(measurements, &corrections);
@@ -125,6 +166,7 @@ pub(in crate::recover) async fn estimate(
     faults.extend(moved);
     let order = linalg::ascending_order(faults.iter().map(|fault| fault.0 as f64));
     Ok(Photometry {
+        mean_function,
         faults: order.into_iter().map(|i| faults[i]).collect(),
         corrections,
     })
@@ -141,10 +183,10 @@ impl CorrectionStep {
     }
 
     /// Composes the step with the corrections of the photographs `used`.
-    fn apply(&self, used: &[usize], corrections: &mut [LinearCorrection]) {
+    fn apply(&self, used: &[usize], corrections: &mut [PhotographCorrection]) {
         let [scales, offsets] = &self.steps;
         for (i, &l) in used.iter().enumerate() {
-            let LinearCorrection { scale, offset } = &mut corrections[l];
+            let PhotographCorrection { scale, offset, .. } = &mut corrections[l];
             let factor = 1.0 + scales[i];
             *scale = (*scale * factor).clamp(SCALES[0], SCALES[1]);
             *offset = *offset * factor + offsets[i];
@@ -161,34 +203,34 @@ impl CorrectionStep {
         outliers.map(|(i, _)| i).collect()
     }
 
-    /// Photographs whose picture is shifted, by their positions, with the shift. The camera's place is that in the first half
-    /// of the capture: the Gray code comes before it. None if the others moved as well.
-    fn shifted(&self) -> Vec<(usize, [f64; 2])> {
-        let first_half = self.shifts[0].len().div_ceil(2);
-        let place = [0, 1].map(|axis| median(&self.shifts[axis][..first_half]));
-        let shift = |i: usize| [0, 1].map(|axis| self.shifts[axis][i] - place[axis]);
-        let is_shifted = |&(i, shift): &(usize, [f64; 2])| {
-            (0..2).any(|axis| {
-                let error = self.shift_errors[axis][i];
-                error < MAX_SHIFT_ERROR && shift[axis].abs() > MIN_SHIFT + SHIFT_ERRORS * error
-            })
-        };
-        let all = (0..self.shifts[0].len()).map(|i| (i, shift(i)));
-        let (shifted, steady): (Vec<_>, Vec<_>) = all.partition(is_shifted);
-        if steady.is_empty() {
-            return Vec::new();
-        }
-        let distances = steady.iter().map(|(_, [x, y])| (x * x + y * y).sqrt());
-        let deviation = median(&distances.collect::<Vec<f64>>());
-        match deviation < MAX_STEADY_SHIFT {
-            true => shifted,
-            false => Vec::new(),
+    /// Whether shifts may be more than noise.
+    fn has_shifts(&self) -> bool {
+        let mut axes = self.shifts.iter().zip(&self.shift_errors);
+        axes.any(|(shifts, errors)| are_significant(shifts, errors))
+    }
+
+    /// Adds the step of the shifts to the corrections of those of the photographs `used` that `is_adjusted`, relative to
+    /// the camera's place.
+    fn apply_shifts(
+        &self,
+        used: &[usize],
+        corrections: &mut [PhotographCorrection],
+        is_adjusted: impl Fn(usize) -> bool,
+    ) {
+        for axis in 0..2 {
+            let step = used.iter().zip(&self.shifts[axis]);
+            let shifts = step.map(|(&l, step)| corrections[l].shift[axis] + step);
+            let shifts: Vec<f64> = shifts.collect();
+            let place = place(&shifts, self.flood_shift.map(|shift| shift[axis]));
+            for (&l, shift) in used.iter().zip(shifts).filter(|(l, _)| is_adjusted(**l)) {
+                corrections[l].shift[axis] = (shift - place).clamp(-MAX_SHIFT, MAX_SHIFT);
+            }
         }
     }
 
     /// Shrinks the corrections of the photographs `used` towards none, by the variance that exceeds their standard errors
     /// (empirical Bayes); those that are not significant become none.
-    fn keep_significant(&self, used: &[usize], corrections: &mut [LinearCorrection]) {
+    fn keep_significant(&self, used: &[usize], corrections: &mut [PhotographCorrection]) {
         let [scale_errors, offset_errors] = &self.errors;
         let scales: Vec<f64> = used.iter().map(|&l| corrections[l].scale).collect();
         let middle = median(&scales);
@@ -204,11 +246,68 @@ impl CorrectionStep {
         let is_significant = mean.abs() > SIGNIFICANT_ERRORS * self.mean_offset_error;
         let mean = if is_significant { mean } else { 0.0 };
         for (i, &l) in used.iter().enumerate() {
-            corrections[l] = LinearCorrection {
-                scale: 1.0 + relative[i],
-                offset: mean + centred[i],
-            };
+            corrections[l].scale = 1.0 + relative[i];
+            corrections[l].offset = mean + centred[i];
         }
+        let has_shifts = (0..2).any(|axis| {
+            let shifts: Vec<f64> = used.iter().map(|&l| corrections[l].shift[axis]).collect();
+            are_significant(&shifts, &self.shift_errors[axis])
+        });
+        if !has_shifts {
+            used.iter().for_each(|&l| corrections[l].shift = [0.0; 2]);
+        }
+    }
+}
+
+/// Whether shifts in camera pixels with standard `errors` are significant, together or one of them.
+fn are_significant(shifts: &[f64], errors: &[f64]) -> bool {
+    let is_large = |(shift, error): (&f64, &f64)| {
+        *error < MAX_SHIFT_ERROR && shift.abs() > MIN_SHIFT + SHIFT_ERRORS * error
+    };
+    let mean_square = linalg::dot(shifts, shifts) / shifts.len() as f64;
+    mean_square > MIN_RMS_SHIFT.powi(2) && mean_square_ratio(shifts, errors) > SIGNIFICANT_VARIANCE
+        || shifts.iter().zip(errors).any(is_large)
+}
+
+/// The photographs taken from another place than the others of `used`, which were taken from one: the camera moved once.
+fn moved_photographs(used: &[usize], corrections: &[PhotographCorrection]) -> Vec<usize> {
+    let distance = |l: usize| {
+        let [x, y] = corrections[l].shift;
+        (x * x + y * y).sqrt()
+    };
+    let mut moved = Vec::new();
+    let mut distances = Vec::new();
+    for &l in used {
+        match distance(l) {
+            far if far > MIN_MOVE => moved.push(l),
+            near => distances.push(near),
+        }
+    }
+    if distances.is_empty() || median(&distances) > MAX_STEADY_SHIFT {
+        moved.clear();
+    }
+    moved
+}
+
+/// The camera's place along one axis: the mean shift of photographs that are near those of the first half, as the Gray
+/// code comes before them; the flood photograph's where this may be the same.
+fn place(shifts: &[f64], flood: Option<f64>) -> f64 {
+    let first_half = &shifts[..shifts.len().div_ceil(2)];
+    let middle = median(first_half);
+    let distances = first_half.iter().map(|shift| (shift - middle).abs());
+    // Two thirds of the standard deviation, if shifts are normal.
+    let distance = median(&distances.collect::<Vec<f64>>());
+    let is_near = |shift: f64| (shift - middle).abs() <= MIN_SHIFT + 3.0 * distance;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for &shift in shifts.iter().filter(|shift| is_near(**shift)) {
+        sum += shift;
+        count += 1.0;
+    }
+    let mean = sum / count;
+    let tolerance = MIN_RMS_SHIFT + 4.5 * distance / count.sqrt();
+    match flood {
+        Some(flood) if (flood - mean).abs() <= tolerance => flood,
+        _ => mean,
     }
 }
 

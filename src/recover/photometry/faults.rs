@@ -44,7 +44,7 @@ pub enum PhotographFault {
     OtherObject,
     /// The camera or the object had moved.
     Moved {
-        /// The picture's shift in camera pixels, to the right and down. Shifts above a pixel are underestimated.
+        /// The picture's shift in camera pixels, to the right and down. Shifts above 0.75 pixels are underestimated.
         shift: [f64; 2],
     },
     /// It shows its pattern and object, but not as the others do: blurred, or covered in part.

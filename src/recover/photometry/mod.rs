@@ -15,23 +15,29 @@ mod calibrated_measurements;
 mod equations;
 mod estimate;
 mod faults;
+mod resampling;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests;
 mod window_covariance;
 
 pub(super) use calibrated_measurements::CalibratedMeasurements;
-pub use calibrated_measurements::LinearCorrection;
+pub use calibrated_measurements::PhotographCorrection;
 pub(super) use equations::max_bytes;
 pub(super) use estimate::estimate;
 pub use faults::PhotographFault;
+pub(super) use resampling::{
+    HALO, ResampledPhotographs, ResamplingInput, max_prepared_bytes, max_tile_bytes,
+};
 
 /// Corrections of the photographs, and those that are left out.
 #[derive(Clone, Debug, Default)]
 pub struct Photometry {
     /// One for each photograph; none at all if no photograph needs one.
-    pub corrections: Vec<LinearCorrection>,
+    pub corrections: Vec<PhotographCorrection>,
     /// The photographs that are left out, by their indices in the measurements, with the fault that each looks like.
     pub faults: Vec<(usize, PhotographFault)>,
+    /// The mean function that shifted photographs are [resampled](resampling) with, `[slot]`.
+    pub mean_function: Vec<f64>,
 }
 
 impl Photometry {

@@ -8,7 +8,7 @@ use crate::recover::holdout_split::HoldoutSplit;
 use crate::recover::mean_function::mean_function;
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::test_problems::{SyntheticCapture, uniform};
-use crate::transport::CHANNELS;
+use crate::transport::{CHANNELS, CameraPixel, Extent, TileRect};
 
 const PATTERNS: usize = 40;
 
@@ -16,6 +16,10 @@ const PATTERNS: usize = 40;
 fn photometry(change: impl FnOnce(&mut Measurements)) -> Photometry {
     let mut capture = SyntheticCapture::with_variation(PATTERNS, 0.1);
     change(&mut capture.measurements);
+    photometry_of(&capture)
+}
+
+fn photometry_of(capture: &SyntheticCapture) -> Photometry {
     let measurements = CalibratedMeasurements::uncorrected(&capture.measurements);
     let preparation = RecoveryPreparationInput {
         measurements: &measurements,
@@ -75,6 +79,104 @@ fn a_single_exposure_is_corrected_and_the_others_are_not() {
             (correction.gain() - expected).abs() < 0.005,
             "photograph {l}: {correction:?}"
         );
+    }
+}
+
+/// A capture whose pictures are shifted, with the cubic convolution of Keys (1981) at the places of the shift.
+fn shift_pictures(measurements: &mut Measurements, shift: impl Fn(usize) -> [f64; 2]) {
+    let Extent { width, height } = measurements.camera;
+    let kernel = |x: f64| match x.abs() {
+        x if x < 1.0 => 1.5 * x.powi(3) - 2.5 * x * x + 1.0,
+        x if x < 2.0 => -0.5 * x.powi(3) + 2.5 * x * x - 4.0 * x + 2.0,
+        _ => 0.0,
+    };
+    for (l, photo) in measurements.photos.iter_mut().enumerate() {
+        let (picture, [dx, dy]) = (photo.clone(), shift(l));
+        for (n, sample) in photo.iter_mut().enumerate() {
+            let (x, y) = (n as i64 % i64::from(width), n as i64 / i64::from(width));
+            let mut sum = [0.0; CHANNELS];
+            for (j, i) in (-3..=3).flat_map(|j| (-3..=3).map(move |i| (j, i))) {
+                let weight = kernel(i as f64 + dx) * kernel(j as f64 + dy);
+                let (x, y) = (
+                    (x + i).clamp(0, i64::from(width) - 1),
+                    (y + j).clamp(0, i64::from(height) - 1),
+                );
+                let source = picture[(y * i64::from(width) + x) as usize];
+                (0..CHANNELS).for_each(|c| sum[c] += weight * f64::from(source[c]));
+            }
+            *sample = sum.map(|value| value as f32);
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_trembles_is_followed() {
+    let mut random = uniform(3);
+    let mut shifts: Vec<[f64; 2]> = (0..PATTERNS)
+        .map(|_| [0.5 * random(), 0.5 * random()])
+        .collect();
+    for axis in 0..2 {
+        let mean = shifts.iter().map(|shift| shift[axis]).sum::<f64>() / PATTERNS as f64;
+        shifts.iter_mut().for_each(|shift| shift[axis] -= mean);
+    }
+    let clean = SyntheticCapture::smooth(PATTERNS).measurements;
+    let mut capture = SyntheticCapture::smooth(PATTERNS);
+    shift_pictures(&mut capture.measurements, |l| shifts[l]);
+    let photometry = photometry_of(&capture);
+    assert!(photometry.faults.is_empty(), "{:?}", photometry.faults);
+    for (l, correction) in photometry.corrections.iter().enumerate() {
+        for axis in 0..2 {
+            let error = correction.shift[axis] - shifts[l][axis];
+            assert!(error.abs() < 0.02, "photograph {l}: {error}");
+        }
+    }
+    let used: Vec<usize> = (0..PATTERNS).collect();
+    let input = ResamplingInput {
+        measurements: &capture.measurements,
+        corrections: &photometry.corrections,
+        geometry: &capture.geometry,
+        mean_function: &photometry.mean_function,
+        used: &used,
+    };
+    let rect = TileRect {
+        x: 8,
+        y: 8,
+        extent: Extent::new(16, 16),
+    };
+    let (mut before, mut after) = (0.0, 0.0);
+    let (picture, region) = (
+        ResampledPhotographs::of_picture(input).unwrap(),
+        ResampledPhotographs::of_region(input, rect).unwrap(),
+    );
+    for pixel in rect.pixels() {
+        for l in 0..PATTERNS {
+            let expected = clean.sample(l, pixel, 0);
+            before += (capture.measurements.sample(l, pixel, 0) - expected).powi(2);
+            after += (picture.sample(l, pixel, 0) - expected).powi(2);
+            let difference = picture.sample(l, pixel, 0) - region.sample(l, pixel, 0);
+            assert!(difference.abs() < 1e-6, "{difference}");
+        }
+    }
+    assert!(after < 0.02 * before, "{}", after / before);
+    let outside = CameraPixel { x: 4, y: 9 };
+    assert!(region.sample(0, outside, 0).is_nan());
+}
+
+#[test]
+fn photographs_after_a_move_are_left_out() {
+    let mut capture = SyntheticCapture::smooth(PATTERNS);
+    let after = 24;
+    shift_pictures(&mut capture.measurements, |l| {
+        if l < after { [0.0; 2] } else { [0.5, -0.3] }
+    });
+    let faults = photometry_of(&capture).faults;
+    assert_eq!(faults.len(), PATTERNS - after, "{faults:?}");
+    for (i, (l, fault)) in faults.into_iter().enumerate() {
+        assert_eq!(l, after + i);
+        let PhotographFault::Moved { shift: [x, y] } = fault else {
+            panic!("photograph {l}: {fault:?}");
+        };
+        assert!((x - 0.5).abs() < 0.05 && (y + 0.3).abs() < 0.05, "{x} {y}");
     }
 }
 

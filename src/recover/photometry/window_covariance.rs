@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::CalibratedMeasurements;
 use crate::linalg::{self, dot};
 use crate::recover::sampling::PixelsSharingWindow;
-use crate::transport::{CameraPixel, Geometry, LightElement};
+use crate::transport::{CameraPixel, Extent, Geometry, LightElement};
 
 /// Variance of a function's elements as a share of h²: four times that of the learned prior's start, whose neighbouring
 /// elements vary together.
@@ -71,15 +71,35 @@ impl WindowModel {
         plane: usize,
         pattern_indices: &[usize],
     ) -> Self {
+        let planes: Vec<&[f32]> = pattern_indices
+            .iter()
+            .map(|&l| measurements.patterns[l].plane(plane))
+            .collect();
+        let emission = |i: usize, m: usize| planes[i][m];
+        Self::of_emissions(geometry, mean_function, origin, planes.len(), emission)
+    }
+
+    /// For one photograph with all elements lit.
+    pub fn of_flood(geometry: &Geometry, mean_function: &[f64], origin: LightElement) -> Self {
+        Self::of_emissions(geometry, mean_function, origin, 1, |_, _| 1.0)
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    fn of_emissions(
+        geometry: &Geometry,
+        mean_function: &[f64],
+        origin: LightElement,
+        patterns: usize,
+        emission: impl Fn(usize, usize) -> f32,
+    ) -> Self {
         let elements: Vec<_> = geometry.elements_of_window(origin).collect();
         let width = elements.len() + 1;
-        let mut factor = vec![0.0; pattern_indices.len() * width];
-        let mut means = Vec::with_capacity(pattern_indices.len());
-        for (&l, row) in pattern_indices.iter().zip(factor.chunks_exact_mut(width)) {
-            let pattern = measurements.patterns[l].plane(plane);
+        let mut factor = vec![0.0; patterns * width];
+        let mut means = Vec::with_capacity(patterns);
+        for (i, row) in factor.chunks_exact_mut(width).enumerate() {
             let mut mean = 0.0;
             for (&(slot, m), value) in elements.iter().zip(&mut *row) {
-                *value = mean_function[slot] * f64::from(pattern[m]);
+                *value = mean_function[slot] * f64::from(emission(i, m));
                 mean += *value;
                 *value *= RELATIVE_VARIANCE.sqrt();
             }
@@ -131,7 +151,10 @@ impl WindowModel {
             y.iter_mut().for_each(|y| *y *= unit);
             noise.iter_mut().for_each(|noise| *noise *= weight * weight);
             let gradients = [(1, 0), (0, 1)].map(|step| {
-                let gradient = |&l: &usize| unit * gradient(measurements, l, pixel, c, step);
+                let gradient = |&l: &usize| {
+                    let sample = |pixel| measurements.sample(l, pixel, c);
+                    unit * gradient(measurements.camera, sample, pixel, step)
+                };
                 pattern_indices.iter().map(gradient).collect()
             });
             Some(ScaledPixel {
@@ -147,6 +170,25 @@ impl WindowModel {
         channels.filter_map(scale).collect()
     }
 
+    /// The inverse of `FFᵀ` with `variance` added to each photograph's, `[L, L]`.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    pub fn inverse_covariance(&self, variance: impl Fn(usize) -> f64) -> Option<Vec<f64>> {
+        let patterns = self.means.len();
+        let mut covariance = vec![0.0; patterns * patterns];
+        for (i, row) in self.rows().enumerate() {
+            for (j, other) in self.rows().enumerate().skip(i) {
+                covariance[i * patterns + j] = dot(row, other);
+            }
+            covariance[i * patterns + i] += variance(i);
+        }
+        linalg::cholesky(&mut covariance, patterns)?;
+        let mut scratch = vec![0.0; patterns * patterns];
+        let mut inverse = vec![0.0; patterns * patterns];
+        linalg::cholesky_inverse(&covariance, patterns, &mut scratch, &mut inverse);
+        linalg::mirror_upper(&mut inverse, patterns);
+        Some(inverse)
+    }
+
     /// Scales the channels of `pixels`, and inverts the covariance. `None` if no channel can be used.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn with_pixels(
@@ -160,41 +202,36 @@ impl WindowModel {
         if pixels.is_empty() {
             return None;
         }
-        let patterns = self.means.len();
-        let mut covariance = vec![0.0; patterns * patterns];
-        for (i, row) in self.rows().enumerate() {
-            for (j, other) in self.rows().enumerate().skip(i) {
-                covariance[i * patterns + j] = dot(row, other);
-            }
-            covariance[i * patterns + i] += UNEXPLAINED_VARIANCE;
-        }
-        linalg::cholesky(&mut covariance, patterns)?;
-        let mut scratch = vec![0.0; patterns * patterns];
-        let mut inverse = vec![0.0; patterns * patterns];
-        linalg::cholesky_inverse(&covariance, patterns, &mut scratch, &mut inverse);
-        linalg::mirror_upper(&mut inverse, patterns);
+        let inverse = self.inverse_covariance(|_| UNEXPLAINED_VARIANCE)?;
         let model = self;
         Some((WindowCovariance { model, inverse }, pixels))
     }
 }
 
-/// Half the difference of the samples of a photograph beside a pixel, along `(x, y)`; zero if one is not measured.
+/// Half the difference of samples beside a pixel, along `(x, y)`; zero if one is not measured.
 fn gradient(
-    measurements: &CalibratedMeasurements<'_>,
-    l: usize,
+    camera: Extent,
+    sample: impl Fn(CameraPixel) -> f64,
     CameraPixel { x, y }: CameraPixel,
-    c: usize,
     (dx, dy): (u32, u32),
 ) -> f64 {
-    let camera = measurements.camera;
     if x < dx || y < dy || x + dx >= camera.width || y + dy >= camera.height {
         return 0.0;
     }
-    let sample = |x: u32, y: u32| measurements.sample(l, CameraPixel { x, y }, c);
+    let sample = |x: u32, y: u32| sample(CameraPixel { x, y });
     let difference = sample(x + dx, y + dy) - sample(x - dx, y - dy);
     if difference.is_nan() {
         0.0
     } else {
         0.5 * difference
     }
+}
+
+/// Gradient of samples at a pixel, per camera pixel to the right and down.
+pub(super) fn gradients(
+    camera: Extent,
+    sample: impl Fn(CameraPixel) -> f64,
+    pixel: CameraPixel,
+) -> [f64; 2] {
+    [(1, 0), (0, 1)].map(|step| gradient(camera, &sample, pixel, step))
 }

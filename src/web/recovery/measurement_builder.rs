@@ -183,6 +183,7 @@ impl MeasurementBuilder {
             full_scale: self.full_scale,
             rows: CameraRowSet::all(self.camera.height),
             photos: self.photos,
+            flood: None,
             noise: NoiseModel::from_dark(dark, self.camera.width, self.quantum),
         };
         measurements.noise = NoiseModel::with_gain_from(&measurements);

@@ -229,7 +229,8 @@ impl Recovery {
     /// Codes of doubts: `low-snr`, `band-unbounded`, `band-undetermined`, `saturation` and `overexposed`; then one for each
     /// photograph that is left out, with the index of its shot: `photograph-unknown-pattern 3`, `photograph-object 3`,
     /// `photograph-distorted 3`, `photograph-pattern 3 7` (it shows the pattern of shot 7), and `photograph-blend 3 7 50`
-    /// (50 % of the light is that pattern's); one for all that are moved, `photograph-moved 3 20` (shot 3 and 19 others).
+    /// (50 % of the light is that pattern's); one for all that are moved, `photograph-moved 3 20` (shot 3 and 19 others);
+    /// and `camera-trembled 12` (by 0.12 pixels, root mean square).
     #[wasm_bindgen(getter)]
     pub fn warnings(&self) -> Vec<String> {
         let is_low = |snr: Decibels| snr < MIN_PLAUSIBLE_SNR;
@@ -258,7 +259,9 @@ impl Recovery {
             .iter()
             .filter(|fault| !fault.1.is_moved() || first == Some(fault));
         let warnings = told.map(|&(l, fault)| fault_warning(shots, l, fault, count));
-        doubts.chain(warnings).collect()
+        let shift = self.recovery().trembling();
+        let trembled = shift.map(|shift| format!("camera-trembled {}", (100.0 * shift) as u32));
+        doubts.chain(warnings).chain(trembled).collect()
     }
 }
 

@@ -33,6 +33,7 @@ impl TileRecovery {
             patterns,
             rows: CameraRowSet::from_strips([]),
             photos: vec![LinearPhoto::new(); full_scale.len()],
+            flood: None,
             full_scale,
             noise,
         };

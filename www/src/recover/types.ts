@@ -139,6 +139,7 @@ export type RecoveryWarningCode =
   | 'saturation'
   | 'overexposed'
   | 'unknown-fields'
+  | 'camera-trembled'
   | PhotographFaultCode;
 
 /** Why a photograph is left out. */

@@ -42,6 +42,7 @@ test('each photograph that is left out has a warning of its own, which names its
     'photograph-distorted 23',
     'photograph-moved 30 1',
     'photograph-moved 30 25',
+    'camera-trembled 12',
   ]);
   assert.deepEqual(
     warnings.map(({ code, message }) => [code, message]),
@@ -67,8 +68,13 @@ test('each photograph that is left out has a warning of its own, which names its
       ]),
       ...['shots[30] is', 'shots[30] and 24 more are'].map((subject) => [
         'photograph-moved',
-        `${subject} left out: the camera or the object had moved by more than a tenth of a pixel.`,
+        `${subject} left out: the camera or the object had moved by more than a third of a pixel.`,
       ]),
+      [
+        'camera-trembled',
+        'The camera trembled: pictures are shifted by 0.12 pixels (root mean square) from one photograph to another. ' +
+          'This is corrected, but costs accuracy. Fasten the camera, or wait before each photograph.',
+      ],
     ],
   );
 });

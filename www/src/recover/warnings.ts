@@ -11,7 +11,10 @@ export function describeWarnings(
   const samples = 3 * width * height * shotsUsed.length;
   const percent = ((100 * saturatedSamples) / samples).toFixed(1);
   const side = `${window}x${window} light elements`;
-  const messages: Record<Exclude<RecoveryWarningCode, PhotographFaultCode>, string> = {
+  const messages: Record<
+    Exclude<RecoveryWarningCode, PhotographFaultCode | 'camera-trembled'>,
+    string
+  > = {
     'low-snr':
       `The SNR on held-out patterns is only ${expectedSnr.toFixed(1)} dB. Check that the photographs are linear, that ` +
       'the light was steady and that the correspondence is right. With few patterns, or another method than learned, ' +
@@ -29,7 +32,8 @@ export function describeWarnings(
   const given = unknownFields.length > 0 ? ['unknown-fields', ...warnings] : warnings;
   return given.map((warning) => {
     const [code, ...numbers] = warning.split(' ') as [RecoveryWarningCode, ...string[]];
-    return { code, message: { ...messages, ...faultMessages(numbers) }[code] };
+    const texts = { ...messages, ...faultMessages(numbers), ...tremblingMessage(numbers) };
+    return { code, message: texts[code] };
   });
 }
 
@@ -49,7 +53,16 @@ function faultMessages([shot, other, percent]: string[]): Record<PhotographFault
       (other === '1'
         ? `shots[${shot}] is left out`
         : `shots[${shot}] and ${Number(other) - 1} more are left out`) +
-      ': the camera or the object had moved by more than a tenth of a pixel.',
+      ': the camera or the object had moved by more than a third of a pixel.',
     'photograph-distorted': `${leftOut} differs from its prediction. Is it blurred, or did something cover the object?`,
+  };
+}
+
+/** The message of a camera that trembled, by hundredths of a pixel. */
+function tremblingMessage([hundredths]: string[]): Record<'camera-trembled', string> {
+  return {
+    'camera-trembled':
+      `The camera trembled: pictures are shifted by ${(Number(hundredths) / 100).toFixed(2)} pixels (root mean square) ` +
+      'from one photograph to another. This is corrected, but costs accuracy. Fasten the camera, or wait before each photograph.',
   };
 }
