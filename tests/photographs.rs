@@ -79,6 +79,14 @@ impl Capture {
             .unwrap()
     }
 
+    /// The message of a recovery that fails.
+    fn error(&self) -> String {
+        let output = self.recover(&[]);
+        assert!(!output.status.success());
+        assert!(!self.output().exists());
+        String::from_utf8(output.stderr).unwrap()
+    }
+
     fn report(&self) -> (Value, String) {
         let output = self.recover(&[]);
         let errors = String::from_utf8(output.stderr).unwrap();
@@ -212,8 +220,8 @@ fn photographs_after_a_bump_are_left_out() {
 #[test]
 fn photographs_that_follow_from_nothing_are_written_by_force_only() {
     let capture = Capture::new();
-    // From the middle of the session on, the picture is three pixels further up.
-    for l in 30..60 {
+    // In every other photograph, the picture is three pixels further up.
+    for l in (1..60).step_by(2) {
         let photo = capture.read(l);
         let height = photo.height();
         let moved = Photograph::from_fn(photo.width(), height, |x, y| {
@@ -232,4 +240,92 @@ fn photographs_that_follow_from_nothing_are_written_by_force_only() {
     let forced = capture.recover(&["--method", "learned", "--force"]);
     assert!(forced.status.success());
     assert!(capture.output().exists());
+}
+
+#[test]
+fn a_sequence_that_slipped_is_refused_with_its_place() {
+    let capture = Capture::new();
+    let photos: Vec<Photograph> = (20..60).map(|l| capture.read(l)).collect();
+    for (l, photo) in (20..59).zip(&photos[1..]) {
+        photo.save(capture.photo(l)).unwrap();
+    }
+    let error = capture.error();
+    assert!(
+        error.contains("from shots[20] (photos/0020.png) on, each photograph shows the pattern of the shot after its own"),
+        "{error}"
+    );
+    assert!(error.contains("--patterns 20"), "{error}");
+}
+
+#[test]
+fn a_mirrored_correspondence_is_refused_with_the_right_one() {
+    let capture = Capture::new();
+    let path = capture.path.join("capture.json");
+    let mut manifest: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    manifest["correspondence"]["affine"][0] = serde_json::json!([-0.5, 0, 32]);
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    let error = capture.error();
+    assert!(error.contains("the correspondence is mirrored"), "{error}");
+    assert!(
+        error.contains("\"affine\": [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_move_by_pixels_is_refused_with_its_place() {
+    let capture = Capture::new();
+    for l in 30..60 {
+        let before = capture.read(l);
+        let moved = Photograph::from_fn(64, 64, |x, y| {
+            *before.get_pixel(x.saturating_sub(3), y.saturating_sub(1))
+        });
+        moved.save(capture.photo(l)).unwrap();
+    }
+    let error = capture.error();
+    assert!(
+        error.contains(
+            "moved before shots[30] (photos/0030.png), by about 3 pixels to the right and 1 pixel down"
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_camera_that_trembles_is_followed_and_warned_of() {
+    let capture = Capture::new();
+    for l in (0..60).step_by(2) {
+        let before = capture.read(l);
+        // A shift of a third of a pixel to the right, by the cubic convolution of Keys (1981).
+        let moved = Photograph::from_fn(64, 64, |x, y| {
+            let taps = [(-2, -1.0), (-1, 9.0), (0, 21.0), (1, -2.0)];
+            Rgb(std::array::from_fn(|c| {
+                let sample = |d: i32| {
+                    let x = x.saturating_add_signed(d).min(63);
+                    f64::from(before.get_pixel(x, y)[c])
+                };
+                let sum: f64 = taps.iter().map(|&(d, weight)| weight * sample(d)).sum();
+                (sum / 27.0).round() as u16
+            }))
+        });
+        moved.save(capture.photo(l)).unwrap();
+    }
+    let (report, _) = capture.report();
+    let warnings = report["warnings"].as_array().unwrap();
+    let codes: Vec<&Value> = warnings.iter().map(|warning| &warning["code"]).collect();
+    assert!(
+        codes.contains(&&Value::from("camera-trembled")),
+        "{codes:?}"
+    );
+    let table = report["photograph_table"].as_array().unwrap();
+    let shifts = |parity: u64| {
+        let shots = table
+            .iter()
+            .filter(move |photo| photo["shot"].as_u64().unwrap() % 2 == parity);
+        shots.map(|photo| number(&photo["shift"][0]))
+    };
+    let still = shifts(1).sum::<f64>() / shifts(1).count() as f64;
+    for shift in shifts(0) {
+        assert!((shift - still - 1.0 / 3.0).abs() < 0.05, "{shift} {still}");
+    }
 }

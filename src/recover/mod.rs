@@ -15,6 +15,7 @@
 
 mod bpdn;
 mod common_mode_weight;
+mod diagnosis;
 mod error;
 mod gram_cache;
 mod holdout_split;
@@ -40,6 +41,7 @@ mod window_size;
 
 pub use bpdn::{Homotopy, SparsityBasis};
 pub use common_mode_weight::CommonModeWeight;
+pub use diagnosis::{CaptureFault, LightPlaneSymmetry, diagnose};
 pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;
 pub use method::Method;

@@ -17,10 +17,12 @@ use crate::cli::measurement_reader::{MeasurementReader, read_patterns, read_samp
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
-use crate::export::{self, MemoryPlan, PreparedExport, Provenance};
+use crate::export::{self, MIN_PLAUSIBLE_SNR, MemoryPlan, PreparedExport, Provenance};
 use crate::format::{EncodedFile, FormatError, Metadata};
 use crate::job_executor::{Cancelled, Executor};
-use crate::recover::{MIN_PATTERNS, PreparedRecovery, RecoverError, TailEstimate};
+use crate::recover::{
+    MIN_PATTERNS, PreparedRecovery, RecoverError, TailEstimate, WindowSizeEstimate, diagnose,
+};
 use crate::transport::{Basis, Decibels};
 
 /// SNR on held-out patterns below which hardly anything in a file would be right.
@@ -103,11 +105,15 @@ impl RecoverJob<'_> {
         let prepared = self.prepare(&measurements)?;
         let recovery = &prepared.recovery;
         warnings.add(messages::preparation(&prepared));
+        let snr = prepared.expected_snr().filter(|_| !self.args.force);
+        let has_moved = recovery.faults().iter().any(|(_, fault)| fault.is_moved());
+        if snr.is_some_and(|snr| snr < MIN_PLAUSIBLE_SNR) && !has_moved {
+            self.check_capture(&measurements)?;
+        }
         warnings.add(messages::photographs(self.folder, self.shots, recovery));
         warnings.check(self.args.strict)?;
-        match prepared.expected_snr() {
-            Some(snr) if snr < MIN_USABLE_SNR && !self.args.force => bail!(UnusableError(snr)),
-            _ => {}
+        if let Some(snr) = snr.filter(|snr| *snr < MIN_USABLE_SNR) {
+            bail!(UnusableError(snr));
         }
         let (method, window) = (self.args.method(), recovery.geometry().window);
         let rank = recovery.basis().map(Basis::rank);
@@ -159,8 +165,27 @@ impl RecoverJob<'_> {
         let preparation = export::prepare(measurements, method, window, self.cores);
         let prepared = pollster::block_on(preparation);
         drop(spinner);
-        let prepared = prepared.map_err(|error| self.recover_error(error))?;
-        Ok(prepared)
+        prepared.or_else(|error| {
+            if matches!(
+                error,
+                RecoverError::MismatchedPatterns { .. } | RecoverError::UncorrelatedPatterns
+            ) {
+                self.check_capture(measurements)?;
+            }
+            Err(self.recover_error(error))
+        })
+    }
+
+    /// Fails if the capture as a whole has a fault whose cause is found.
+    fn check_capture(&self, measurements: &Measurements) -> Result<()> {
+        let window = self.args.window.unwrap_or(WindowSizeEstimate::MAX_WINDOW);
+        match diagnose(measurements, window) {
+            Some(fault) => {
+                let (folder, shots) = (self.folder, self.shots);
+                Err(messages::capture_fault(folder, shots, measurements, fault))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Recovers the tiles that the checkpoint lacks, strip by strip. Returns the number of overexposed pixels, which is

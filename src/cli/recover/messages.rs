@@ -9,7 +9,10 @@ use crate::export::{
     MIN_PLAUSIBLE_SNR, PreparedExport, TooFewShots, TooLittleMemory, has_implausible_saturation,
     saturated_percent,
 };
-use crate::recover::{PhotographCorrection, PhotographFault, PreparedRecovery, TailEstimate};
+use crate::recover::{
+    CaptureFault, MIN_PATTERNS, PhotographCorrection, PhotographFault, PreparedRecovery,
+    TailEstimate,
+};
 use crate::transport::Decibels;
 
 /// Least standard deviation of exposures, and least stray light, that is worth a note.
@@ -254,6 +257,78 @@ fn note_corrections<'a>(recovery: &PreparedRecovery, name: &dyn Fn(usize) -> &'a
             100.0 * most
         );
     }
+}
+
+/// The error for a capture that has `fault`; `shots` are those of the measurements.
+pub fn capture_fault(
+    folder: &CaptureFolder,
+    shots: &[usize],
+    measurements: &Measurements,
+    fault: CaptureFault,
+) -> anyhow::Error {
+    let listed = &folder.manifest().shots;
+    let shot = |l: usize| format!("shots[{}] ({})", shots[l], listed[shots[l]].photo);
+    let before = |first: usize| match first >= MIN_PATTERNS {
+        true => format!(
+            ", or recover from the shots before with --patterns {}",
+            shots[first]
+        ),
+        false => String::new(),
+    };
+    let text = match fault {
+        CaptureFault::Slipped { first, by } => {
+            let (direction, question) = match by > 0 {
+                true => ("after", "is a photograph missing before it"),
+                false => ("before", "was a photograph taken twice"),
+            };
+            let other = match by.abs() {
+                1 => format!("the shot {direction} its own"),
+                distance => format!("the shot {distance} {direction} its own"),
+            };
+            format!(
+                "from {} on, each photograph shows the pattern of {other}: {question}? List each photograph with its \
+                 pattern{}",
+                shot(first),
+                before(first),
+            )
+        }
+        CaptureFault::Correspondence(symmetry) => {
+            let kind = match symmetry.is_mirrored != symmetry.is_flipped {
+                false if !symmetry.is_transposed => "turned by 180 degrees",
+                true if symmetry.is_transposed => "turned by 90 degrees",
+                _ => "mirrored",
+            };
+            let right = symmetry.of_correspondence(measurements.light, measurements.correspondence);
+            // Without negative zeros.
+            let [u, v] = right.affine.map(|row| row.map(|value| value + 0.0));
+            format!(
+                "the correspondence is {kind}: the photographs follow from their patterns with \
+                 \"correspondence\": {{\"affine\": [{u:?}, {v:?}]}}"
+            )
+        }
+        CaptureFault::Moved {
+            first,
+            shift: [x, y],
+        } => {
+            let along = |distance: i32, [forward, backward]: [&str; 2]| {
+                let direction = if distance > 0 { forward } else { backward };
+                let plural = if distance.abs() == 1 { "" } else { "s" };
+                (distance != 0).then(|| format!("{} pixel{plural} {direction}", distance.abs()))
+            };
+            let distances = [
+                along(x, ["to the right", "to the left"]),
+                along(y, ["down", "up"]),
+            ];
+            let distances: Vec<String> = distances.into_iter().flatten().collect();
+            format!(
+                "the camera or the object moved before {}, by about {}: take the shots before or after the move out{}",
+                shot(first),
+                distances.join(" and "),
+                before(first),
+            )
+        }
+    };
+    anyhow!("{}: {text}", folder.manifest_path().display())
 }
 
 /// The error for `shots` whose photographs do not match their patterns.
