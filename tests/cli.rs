@@ -612,7 +612,7 @@ fn a_bad_manifest_is_refused_by_field() {
                 }
             })
         },
-        &["each is listed with the pattern it shows"],
+        &["each photograph shows the pattern of the shot before its own"],
     );
 }
 

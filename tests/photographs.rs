@@ -254,7 +254,7 @@ fn a_sequence_that_slipped_is_refused_with_its_place() {
         error.contains("from shots[20] (photos/0020.png) on, each photograph shows the pattern of the shot after its own"),
         "{error}"
     );
-    assert!(error.contains("--patterns 20"), "{error}");
+    assert!(error.contains("--patterns 19"), "{error}");
 }
 
 #[test]
@@ -285,7 +285,7 @@ fn a_move_by_pixels_is_refused_with_its_place() {
     let error = capture.error();
     assert!(
         error.contains(
-            "moved before shots[30] (photos/0030.png), by about 3 pixels to the right and 1 pixel down"
+            "moved before shots[30] (photos/0030.png), by about 3 pixels to the right and 1 pixel down: remove"
         ),
         "{error}"
     );
@@ -328,4 +328,128 @@ fn a_camera_that_trembles_is_followed_and_warned_of() {
     for shift in shifts(0) {
         assert!((shift - still - 1.0 / 3.0).abs() < 0.05, "{shift} {still}");
     }
+}
+
+#[test]
+fn hot_pixels_are_filled() {
+    let clean = Capture::new().report().0;
+    let capture = Capture::new();
+    let hot = [(10, 20), (40, 33), (63, 5)].map(|(x, y)| 64 * y + x);
+    for l in 0..60 {
+        capture.change(l, |i, y| match i / 3 {
+            n if hot.contains(&n) => 1.05,
+            _ => y,
+        });
+    }
+    let (report, errors) = capture.report();
+    assert!(errors.contains("3 hot pixels are filled"), "{errors}");
+    assert_eq!(report["hot_pixels"], 3);
+    assert_eq!(report["overexposed_pixels"], 0);
+    assert_eq!(clean["hot_pixels"], 0);
+    let loss = number(&clean["expected_snr_db"]) - number(&report["expected_snr_db"]);
+    assert!(loss.abs() < 0.5, "{loss} dB");
+}
+
+#[test]
+fn codes_that_are_declared_wrong_are_warned_of() {
+    let codes = |capture: &Capture| -> Vec<String> {
+        let (report, _) = capture.report();
+        let warnings = report["warnings"].as_array().unwrap();
+        let code = |warning: &Value| warning["code"].as_str().unwrap().to_owned();
+        warnings.iter().map(code).collect()
+    };
+    let clipped = Capture::new();
+    for l in 0..60 {
+        clipped.change(l, |_, y| y.min(0.25));
+    }
+    let clipped = codes(&clipped);
+    assert!(
+        clipped.contains(&"saturation-undeclared".to_owned()),
+        "{clipped:?}"
+    );
+    let coarse = Capture::new();
+    for l in 0..60 {
+        let mut photo = coarse.read(l);
+        photo
+            .iter_mut()
+            .for_each(|sample| *sample = *sample / 257 * 257);
+        photo.save(coarse.photo(l)).unwrap();
+    }
+    let coarse = codes(&coarse);
+    assert!(
+        coarse.contains(&"photographs-8-bit".to_owned()),
+        "{coarse:?}"
+    );
+    assert!(
+        !coarse.contains(&"saturation-undeclared".to_owned()),
+        "{coarse:?}"
+    );
+}
+
+#[test]
+fn a_known_transport_is_photographed_again_with_faults() {
+    let folder = TempDir::new().unwrap();
+    let [original, faulty] = ["original", "faulty"].map(|name| folder.path().join(name));
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
+        command.args(arguments).output().unwrap()
+    };
+    let [from, to] = [&original, &faulty].map(|path| path.to_str().unwrap());
+    let simulated = run(&[
+        "simulate",
+        "cookies",
+        "-o",
+        from,
+        "--camera",
+        "32x32",
+        "--light",
+        "16x16",
+        "--patterns",
+        "40",
+    ]);
+    assert!(simulated.status.success());
+    let photographed = run(&[
+        "photograph",
+        from,
+        "-o",
+        to,
+        "--fault",
+        "jitter=0.1",
+        "--fault",
+        "swap",
+    ]);
+    assert!(
+        photographed.status.success(),
+        "{}",
+        String::from_utf8_lossy(&photographed.stderr)
+    );
+    let file = folder.path().join("file.ltm");
+    let file = file.to_str().unwrap();
+    let recovered = run(&["recover", to, "-o", file, "--json"]);
+    let report: Value = serde_json::from_slice(&recovered.stdout).unwrap();
+    let table = report["photograph_table"].as_array().unwrap();
+    let left_out = table
+        .iter()
+        .filter(|photo| photo["verdict"] == "photograph-pattern");
+    let left_out: Vec<u64> = left_out
+        .map(|photo| photo["shot"].as_u64().unwrap())
+        .collect();
+    assert_eq!(left_out, [20, 21]);
+    let gains = table.iter().map(|photo| number(&photo["gain"]));
+    let deviation = gains.map(|gain| (gain - 1.0).powi(2)).sum::<f64>() / table.len() as f64;
+    assert!(
+        (0.06..0.14).contains(&deviation.sqrt()),
+        "{}",
+        deviation.sqrt()
+    );
+    let evaluated = run(&["evaluate", file, to, "--json"]);
+    let evaluated: Value = serde_json::from_slice(&evaluated.stdout).unwrap();
+    assert!(
+        number(&evaluated["snr_db"]) > 20.0,
+        "{}",
+        evaluated["snr_db"]
+    );
+    let unknown = run(&["photograph", from, "-o", "x", "--fault", "jiter"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("jitter=0.02"));
 }

@@ -123,7 +123,7 @@ fn photographs_and_relit_pictures_match_the_known_transport() {
             let (mut shot, mut photo) = (folder.open_shot(i, &dark).unwrap(), LinearPhoto::new());
             let rows = CameraRowSet::all(folder.manifest().camera.height);
             shot.read(&rows, &mut photo).unwrap();
-            assert_eq!(shot.finish().unwrap(), 0, "saturated samples");
+            assert_eq!(shot.finish().unwrap().saturated, 0, "saturated samples");
             let light: Vec<_> = pattern.iter().map(|&p| [f64::from(p); CHANNELS]).collect();
             for (expected, measured) in picture(&folder, &light).iter().zip(&photo) {
                 for c in 0..CHANNELS {

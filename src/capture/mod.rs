@@ -8,16 +8,22 @@
 //! than memory can be recovered strip by strip ([`CameraRowSet`]).
 
 mod camera_row_set;
+#[cfg(feature = "capture")]
+mod code_statistics;
 mod error;
 #[cfg(feature = "capture")]
 mod folder;
 mod group_ids;
+#[cfg(any(test, all(feature = "capture", not(target_arch = "wasm32"))))]
+mod hot_pixels;
 mod manifest;
 mod measurements;
 mod noise_estimate;
 mod noise_model;
 
 pub use camera_row_set::CameraRowSet;
+#[cfg(feature = "capture")]
+pub use code_statistics::CodeStatistics;
 pub use error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 #[cfg(feature = "capture")]
 pub use folder::{

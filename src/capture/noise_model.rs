@@ -53,6 +53,12 @@ impl NoiseModel {
         }
     }
 
+    /// The same for codes that are `quantum` apart: with at least the variance of their rounding.
+    pub fn with_quantum(mut self, quantum: f64) -> Self {
+        self.floor = self.floor.map(|floor| floor.max(quantum * quantum / 12.0));
+        self
+    }
+
     /// Variance of a sample `y` of channel `c` at relative exposure `exposure`.
     pub fn variance(&self, c: usize, y: f64, exposure: f64) -> f64 {
         (self.gain[c] * y.max(0.0) + self.floor[c] / exposure) / exposure

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::progress;
 use crate::capture::{
-    CameraRowSet, CaptureError, CaptureFolder, DarkFrame, LinearPhoto, Measurements, NoiseModel,
-    PhotographRowReader,
+    CameraRowSet, CaptureError, CaptureFolder, CodeStatistics, DarkFrame, LinearPhoto,
+    Measurements, NoiseModel, PhotographRowReader,
 };
 use crate::job_executor::Executor;
 
@@ -41,9 +41,20 @@ pub fn read_sample_of(
     Ok(samples)
 }
 
+/// What the rows that were read say beside their samples.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReadSample {
+    /// Of all rows of the photographs.
+    pub codes: CodeStatistics,
+    /// Number of pixels of the loaded rows that are filled from their neighbours.
+    pub hot_pixels: usize,
+}
+
 /// The opened photographs of some shots.
 pub struct MeasurementReader<'a> {
     photos: Vec<PhotographRowReader<'a>>,
+    /// The measurement of one code.
+    code: f64,
 }
 
 impl<'a> MeasurementReader<'a> {
@@ -54,19 +65,22 @@ impl<'a> MeasurementReader<'a> {
         shots: &[usize],
     ) -> Result<Self, CaptureError> {
         let photos = shots.par_iter().map(|&i| folder.open_shot(i, dark));
+        let camera = &folder.manifest().camera;
         Ok(Self {
             photos: photos.collect::<Result<_, _>>()?,
+            code: (camera.white - camera.black).recip(),
         })
     }
 
     /// Makes `rows` the loaded rows of `measurements`: keeps those it has, reads the others, which must lie below all
-    /// rows read before. Calls `check` before each photograph, and stops if it fails.
+    /// rows read before. Calls `check` before each photograph, and stops if it fails. Returns the number of hot pixels,
+    /// which are filled from their neighbours.
     pub fn load_rows(
         &mut self,
         measurements: &mut Measurements,
         rows: &CameraRowSet,
         check: impl Fn() -> Result<()> + Sync,
-    ) -> Result<()> {
+    ) -> Result<usize> {
         let width = measurements.camera.width as usize;
         let first = rows.strips().first().map_or(0, |strip| strip.start);
         let obsolete = measurements.rows.iter().take_while(|y| *y < first).count();
@@ -80,26 +94,28 @@ impl<'a> MeasurementReader<'a> {
             Ok::<_, Error>(reader.read(rows, photo)?)
         })?;
         measurements.rows = rows.clone();
-        Ok(())
+        Ok(measurements.fill_hot_pixels())
     }
 
     /// Loads `rows`, estimates the noise from them, and reads the rest of all files, which checks that they are whole.
-    /// Returns the number of saturated samples in the photographs.
     pub fn read_sample(
         mut self,
         measurements: &mut Measurements,
         rows: &CameraRowSet,
         executor: &impl Executor,
-    ) -> Result<usize> {
+    ) -> Result<ReadSample> {
         let bar = progress::bar("reading", self.photos.len());
-        self.load_rows(measurements, rows, || {
+        let hot_pixels = self.load_rows(measurements, rows, || {
             bar.inc(1);
             Ok(executor.check_cancelled()?)
         })?;
         drop(bar);
-        let saturated = self.photos.into_par_iter().map(PhotographRowReader::finish);
-        let saturated = saturated.try_reduce(|| 0, |a, b| Ok(a + b))?;
+        let codes = self.photos.into_par_iter().map(PhotographRowReader::finish);
+        let codes = codes.try_reduce(CodeStatistics::default, |a, b| Ok(a.merge(b)))?;
+        measurements.noise = measurements
+            .noise
+            .with_quantum(f64::from(codes.step()) * self.code);
         measurements.noise = NoiseModel::with_gain_from(measurements);
-        Ok(saturated)
+        Ok(ReadSample { codes, hot_pixels })
     }
 }

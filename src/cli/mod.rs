@@ -10,6 +10,7 @@ mod ltm_file;
 mod measurement_reader;
 mod output_file;
 mod output_folder;
+mod photograph;
 mod process_resources;
 mod progress;
 mod recover;
@@ -35,6 +36,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Simulate(simulate::SimulateArgs),
+    Photograph(photograph::PhotographArgs),
     Recover(recover::RecoverArgs),
     Evaluate(evaluate::EvaluateArgs),
     Relight(relight::RelightArgs),
@@ -56,6 +58,7 @@ const DATA_ERROR_STATUS: u8 = 65;
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Simulate(args) => simulate::run(&args),
+        Command::Photograph(args) => photograph::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Relight(args) => relight::run(&args),

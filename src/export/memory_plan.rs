@@ -84,7 +84,7 @@ impl MemoryPlan {
             + element * u64::from(TILE_SIDE * TILE_SIDE) * window.area() as u64;
         let mut plan = Self {
             photograph_bytes: 0,
-            row_bytes: photographs * PIXEL_BYTES * width,
+            row_bytes: (photographs + 1) * PIXEL_BYTES * width, // and the flood photograph
             camera,
             tiles_at_once: 0,
             threads,
@@ -92,15 +92,16 @@ impl MemoryPlan {
             fixed_bytes,
         };
         let all = plan.row_bytes * u64::from(camera.height);
-        // A tile, or while the recovery is prepared, resampled photographs.
-        let tile = tile.max(all.min(method.resampled_bytes(shots) as u64));
+        // Beside the loaded rows: a tile, or while the recovery is prepared, these rows resampled.
+        let resampled = method.resampled_bytes(shots) as u64;
+        let beside = |rows: u64| tile.max(rows.min(resampled));
         let min_rows = (TILE_SIDE + 2 * method.max_halo()).min(camera.height);
         let min_bytes = plan.row_bytes * u64::from(min_rows);
-        plan.ensure_limit(fixed_bytes + tile + min_bytes)?;
+        plan.ensure_limit(fixed_bytes + min_bytes + beside(min_bytes))?;
         let free = limit - fixed_bytes;
-        plan.photograph_bytes = match all <= free - tile {
+        plan.photograph_bytes = match all + beside(all) <= free {
             true => all,
-            false => (free / 2).clamp(min_bytes, free - tile),
+            false => (free / 2).clamp(min_bytes, free - beside(min_bytes)),
         };
         plan.tiles_at_once = threads.min(((free - plan.photograph_bytes) / tile) as usize);
         Ok(plan)

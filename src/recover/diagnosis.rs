@@ -8,6 +8,7 @@
 use super::mean_function;
 use super::preparation_input;
 use crate::capture::Measurements;
+use crate::job_executor::{Cancelled, Executor};
 use crate::linalg::median;
 use crate::transport::{
     CHANNELS, CameraPixel, Correspondence, Extent, LightElement, LightPosition, Window,
@@ -16,7 +17,11 @@ use crate::transport::{
 /// Median correlation of photographs with their patterns above which a correspondence is right; it is 0.2 to 0.7, and 0.01
 /// where photographs show other patterns.
 const MIN_CORRELATION: f64 = 0.1;
-/// Share of the photographs that a diagnosis must explain.
+/// Correlation of a photograph with the pattern that it resembles most, below which it resembles none.
+const MIN_BEST_CORRELATION: f64 = 0.06;
+/// Fewest photographs whose correlations say something.
+const MIN_PHOTOGRAPHS: usize = 12;
+/// Share of the photographs before a slip or move, and of those after it, that must be as the diagnosis says.
 const MIN_EXPLAINED_SHARE: f64 = 0.8;
 /// Fewest photographs that slipped or were taken after a move.
 const MIN_AFFECTED: usize = 3;
@@ -31,11 +36,12 @@ const BLOB_SIGMA: f64 = 1.2;
 /// What is wrong with a capture as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CaptureFault {
-    /// From photograph `first` on, each shows the pattern that is listed `by` positions later (earlier if negative).
+    /// From photograph `first` on, each shows the pattern of the shot that is listed `by` positions later (earlier if
+    /// negative).
     Slipped {
         /// Index in the measurements.
         first: usize,
-        /// Positions.
+        /// Positions in the list of all shots.
         by: isize,
     },
     /// The correspondence is right after this change of the light plane.
@@ -106,78 +112,265 @@ impl LightPlaneSymmetry {
     }
 }
 
-/// Looks for a cause that explains most photographs. `None` if there is none, or too little is measured.
-pub fn diagnose(measurements: &Measurements, window: Window) -> Option<CaptureFault> {
-    preparation_input::geometry(measurements, window).ok()?;
-    let squares = mean_function::sample_squares(measurements);
-    let pixels: Vec<CameraPixel> = squares
-        .into_iter()
-        .flat_map(|square| square.pixels())
-        .collect();
-    let brightness = relative_measurements(measurements, &pixels);
-    let responses = relative_responses(measurements, &pixels, |at| at);
-    let count = measurements.patterns.len();
-    let own: Vec<f64> = (0..count)
-        .map(|l| correlation(&brightness[l], &responses[l]))
-        .collect();
-    slipped(&brightness, &responses)
-        .or_else(|| wrong_correspondence(measurements, &pixels, &brightness, &own))
-        .or_else(|| moved(measurements, &pixels, &responses))
-}
-
-/// `[L][pixel]`: all channels of each photograph relative to their mean over the photographs, less 1; 0 where a sample is
-/// not measured.
-fn relative_measurements(measurements: &Measurements, pixels: &[CameraPixel]) -> Vec<Vec<f64>> {
-    let sample = |l: usize, pixel: CameraPixel| {
-        (0..CHANNELS)
-            .map(|c| measurements.sample(l, pixel, c))
-            .sum::<f64>()
-    };
-    relative(measurements.patterns.len(), pixels.len(), |l, n| {
-        sample(l, pixels[n])
-    })
-}
-
-/// `[L][pixel]`: the light of each pattern around a pixel's correspondence relative to the mean over the patterns, less 1,
-/// after `change` of positions on the light plane.
-fn relative_responses(
+/// Looks for a cause that explains most photographs. `shots` are the positions of the measurements' patterns in the list of
+/// all shots, and `ignored` the measurements that are left out. `None` if there is no such cause, or too little is measured
+/// to tell.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn diagnose(
     measurements: &Measurements,
-    pixels: &[CameraPixel],
-    change: impl Fn(LightPosition) -> LightPosition,
-) -> Vec<Vec<f64>> {
-    let light = measurements.light;
-    let mut blobs: Vec<Vec<(usize, f64)>> = Vec::with_capacity(pixels.len());
-    for pixel in pixels {
-        let LightPosition { u, v } = change(measurements.correspondence.at(*pixel));
-        let mut blob = Vec::new();
-        for (dv, du) in (-BLOB_RADIUS..=BLOB_RADIUS)
-            .flat_map(|dv| (-BLOB_RADIUS..=BLOB_RADIUS).map(move |du| (dv, du)))
-        {
-            let element = LightElement {
-                u: u.floor() as i32 + du,
-                v: v.floor() as i32 + dv,
-            };
-            if let Some(m) = element.index_in(light) {
-                let [x, y] = [
-                    f64::from(element.u) + 0.5 - u,
-                    f64::from(element.v) + 0.5 - v,
-                ];
-                let weight = libm::exp(-0.5 * (x * x + y * y) / (BLOB_SIGMA * BLOB_SIGMA));
-                blob.push((m, weight));
+    window: Window,
+    shots: &[usize],
+    ignored: &[usize],
+    executor: &impl Executor,
+) -> Result<Option<CaptureFault>, Cancelled> {
+    let used: Vec<usize> = (0..shots.len()).filter(|l| !ignored.contains(l)).collect();
+    if used.len() < MIN_PHOTOGRAPHS || preparation_input::geometry(measurements, window).is_err() {
+        return Ok(None);
+    }
+    let squares = mean_function::sample_squares(measurements);
+    let pixels = squares.into_iter().flat_map(|square| square.pixels());
+    let search = Search {
+        measurements,
+        shots,
+        used,
+        pixels: pixels.collect(),
+        executor,
+    };
+    let photographs = search.relative_measurements();
+    let responses = search.relative_responses(|at| at);
+    executor.check_cancelled()?;
+    if let Some(fault) = search.slipped(&photographs, &responses) {
+        return Ok(Some(fault));
+    }
+    executor.check_cancelled()?;
+    if let Some(fault) = search.wrong_correspondence(&photographs, &responses) {
+        return Ok(Some(fault));
+    }
+    executor.check_cancelled()?;
+    Ok(search.moved(&responses))
+}
+
+/// What is searched for a cause.
+struct Search<'a, E> {
+    measurements: &'a Measurements,
+    shots: &'a [usize],
+    /// The photographs that are looked at, by their indices in the measurements. Lists `[L]` are of these.
+    used: Vec<usize>,
+    /// The pixels that are looked at.
+    pixels: Vec<CameraPixel>,
+    executor: &'a E,
+}
+
+impl<E: Executor> Search<'_, E> {
+    /// Sum over the channels of a photograph's sample; NaN where one is not measured.
+    fn sample(&self, l: usize, pixel: CameraPixel) -> f64 {
+        let samples = (0..CHANNELS).map(|c| self.measurements.sample(l, pixel, c));
+        samples.sum()
+    }
+
+    /// `[L][pixel]`: each photograph relative to the mean of all, less 1; 0 where a sample is not measured.
+    fn relative_measurements(&self) -> Vec<Vec<f64>> {
+        let count = self.used.len();
+        relative(count, self.pixels.len(), |i, n| {
+            self.sample(self.used[i], self.pixels[n])
+        })
+    }
+
+    /// `[L][pixel]`: the light of each pattern around a pixel's correspondence relative to the mean over the patterns, less
+    /// 1, after `change` of positions on the light plane.
+    fn relative_responses(&self, change: impl Fn(LightPosition) -> LightPosition) -> Vec<Vec<f64>> {
+        let light = self.measurements.light;
+        let mut blobs: Vec<Vec<(usize, f64)>> = Vec::with_capacity(self.pixels.len());
+        for pixel in &self.pixels {
+            let LightPosition { u, v } = change(self.measurements.correspondence.at(*pixel));
+            let mut blob = Vec::new();
+            let range = -BLOB_RADIUS..=BLOB_RADIUS;
+            for (dv, du) in range
+                .clone()
+                .flat_map(|dv| range.clone().map(move |du| (dv, du)))
+            {
+                let element = LightElement {
+                    u: u.floor() as i32 + du,
+                    v: v.floor() as i32 + dv,
+                };
+                if let Some(m) = element.index_in(light) {
+                    let x = f64::from(element.u) + 0.5 - u;
+                    let y = f64::from(element.v) + 0.5 - v;
+                    let weight = libm::exp(-0.5 * (x * x + y * y) / (BLOB_SIGMA * BLOB_SIGMA));
+                    blob.push((m, weight));
+                }
+            }
+            blobs.push(blob);
+        }
+        let emission = |l: usize, m: usize| -> f64 {
+            let pattern = &self.measurements.patterns[l];
+            (0..CHANNELS).map(|c| f64::from(pattern.plane(c)[m])).sum()
+        };
+        relative(self.used.len(), self.pixels.len(), |i, n| {
+            let blob = blobs[n].iter();
+            blob.map(|&(m, weight)| weight * emission(self.used[i], m))
+                .sum()
+        })
+    }
+
+    /// Finds where photographs begin to show other patterns of the sequence.
+    fn slipped(&self, photographs: &[Vec<f64>], responses: &[Vec<f64>]) -> Option<CaptureFault> {
+        let count = self.used.len();
+        let shot = |i: usize| self.shots[self.used[i]];
+        // The shot whose pattern a photograph resembles most.
+        let best = self.executor.map(count, |i| {
+            let correlations = (0..count).map(|k| (correlation(&photographs[i], &responses[k]), k));
+            let best = correlations.fold((MIN_BEST_CORRELATION, None), |best, (value, k)| {
+                if value > best.0 {
+                    (value, Some(shot(k)))
+                } else {
+                    best
+                }
+            });
+            best.1
+        });
+        let mut found = None;
+        let mut most = 0;
+        for by in (-MAX_SLIP..=MAX_SLIP).filter(|by| *by != 0) {
+            // Patterns of shots that are held out cannot be recognised.
+            let expected = |i: usize| shot(i).checked_add_signed(by);
+            let is_listed = |i: usize| (0..count).any(|k| Some(shot(k)) == expected(i));
+            let knowable: Vec<usize> = (0..count).filter(|&i| is_listed(i)).collect();
+            for first in 0..count {
+                let before = (0..first).filter(|&i| best[i] == Some(shot(i))).count();
+                let after = knowable.iter().filter(|&&i| i >= first);
+                let right = after
+                    .clone()
+                    .filter(|&&i| best[i].is_some() && best[i] == expected(i));
+                let (after, right) = (after.count(), right.count());
+                let is_explained =
+                    right >= MIN_AFFECTED && is_most(right, after) && is_most(before, first);
+                if is_explained && before + right > most {
+                    most = before + right;
+                    let first = self.used[first];
+                    found = Some(CaptureFault::Slipped { first, by });
+                }
             }
         }
-        blobs.push(blob);
+        found
     }
-    let emission = |l: usize, m: usize| -> f64 {
-        let pattern = &measurements.patterns[l];
-        (0..CHANNELS).map(|c| f64::from(pattern.plane(c)[m])).sum()
-    };
-    relative(measurements.patterns.len(), pixels.len(), |l, n| {
-        blobs[n]
-            .iter()
-            .map(|&(m, weight)| weight * emission(l, m))
-            .sum()
-    })
+
+    /// Finds the symmetry of the light plane after which photographs show their patterns.
+    fn wrong_correspondence(
+        &self,
+        photographs: &[Vec<f64>],
+        responses: &[Vec<f64>],
+    ) -> Option<CaptureFault> {
+        let typical = |responses: &[Vec<f64>]| {
+            let pairs = photographs.iter().zip(responses);
+            let correlations: Vec<f64> = pairs.map(|(a, b)| correlation(a, b)).collect();
+            median(&correlations)
+        };
+        let light = self.measurements.light;
+        let symmetries: Vec<LightPlaneSymmetry> = LightPlaneSymmetry::all(light).collect();
+        let correlations = self.executor.map(symmetries.len(), |i| {
+            let change = |at| symmetries[i].apply(light, at);
+            (typical(&self.relative_responses(change)), symmetries[i])
+        });
+        let best = correlations
+            .into_iter()
+            .reduce(|best, other| if other.0 > best.0 { other } else { best })?;
+        let is_right = best.0 > MIN_CORRELATION && best.0 > 2.0 * typical(responses);
+        is_right.then_some(CaptureFault::Correspondence(best.1))
+    }
+
+    /// Finds when the picture shifted, by whole pixels.
+    fn moved(&self, responses: &[Vec<f64>]) -> Option<CaptureFault> {
+        let count = self.used.len();
+        let quarter = count / 4;
+        let found = [(0..quarter, false), (count - quarter..count, true)]
+            .into_iter()
+            .filter_map(|(reference, is_end)| {
+                let shifts = self.shifts(responses, reference);
+                // Of the other end of the session.
+                let shift = match is_end {
+                    true => most_frequent(&shifts[..quarter]),
+                    false => most_frequent(&shifts[count - quarter..]),
+                };
+                let are = |range: &[[i32; 2]], shift: [i32; 2]| {
+                    range.iter().filter(|other| **other == shift).count()
+                };
+                let candidates = (MIN_AFFECTED..=count - MIN_AFFECTED).map(|first| {
+                    let (before, after) = shifts.split_at(first);
+                    let [still, moved] = if is_end {
+                        [after, before]
+                    } else {
+                        [before, after]
+                    };
+                    let right = [are(still, [0, 0]), are(moved, shift)];
+                    let is_explained =
+                        is_most(right[0], still.len()) && is_most(right[1], moved.len());
+                    (if is_explained { right[0] + right[1] } else { 0 }, first)
+                });
+                let best = candidates.fold(
+                    (0, 0),
+                    |best, other| if other.0 > best.0 { other } else { best },
+                );
+                let shift = if is_end { shift.map(|d| -d) } else { shift };
+                let first = self.used[best.1];
+                (shift != [0, 0] && best.0 > 0).then_some(CaptureFault::Moved { first, shift })
+            })
+            .next();
+        found
+    }
+
+    /// The shift of every photograph relative to the place of `reference`, the photographs that tell the object's
+    /// brightness.
+    fn shifts(&self, responses: &[Vec<f64>], reference: std::ops::Range<usize>) -> Vec<[i32; 2]> {
+        let brightness = |&pixel: &CameraPixel| -> f64 {
+            reference
+                .clone()
+                .map(|i| self.sample(self.used[i], pixel))
+                .sum()
+        };
+        let brightness: Vec<f64> = self.pixels.iter().map(brightness).collect();
+        let camera = self.measurements.camera;
+        self.executor.map(self.used.len(), |i| {
+            let pairs = brightness.iter().zip(&responses[i]);
+            let predicted: Vec<f64> = pairs.map(|(f, response)| f * (1.0 + response)).collect();
+            let range = -MAX_MOVE..=MAX_MOVE;
+            let shifts = range
+                .clone()
+                .flat_map(|y| range.clone().map(move |x| [x, y]));
+            let mut best = (0.0, [0, 0]);
+            for [dx, dy] in shifts {
+                let samples = self.pixels.iter().map(|pixel| {
+                    let x = pixel.x.checked_add_signed(dx)?;
+                    let y = pixel.y.checked_add_signed(dy)?;
+                    let is_inside = x < camera.width && y < camera.height;
+                    is_inside.then(|| self.sample(self.used[i], CameraPixel { x, y }))
+                });
+                let value = centred_correlation(samples, &predicted);
+                if value > best.0 {
+                    best = (value, [dx, dy]);
+                }
+            }
+            best.1
+        })
+    }
+}
+
+fn is_most(right: usize, of: usize) -> bool {
+    right as f64 >= MIN_EXPLAINED_SHARE * of as f64
+}
+
+/// The shift of most.
+fn most_frequent(shifts: &[[i32; 2]]) -> [i32; 2] {
+    let count = |shift: &[i32; 2]| shifts.iter().filter(|other| *other == shift).count();
+    let counted = shifts.iter().map(|shift| (count(shift), *shift));
+    counted
+        .fold(
+            (0, [0, 0]),
+            |best, other| if other.0 > best.0 { other } else { best },
+        )
+        .1
 }
 
 fn relative(patterns: usize, pixels: usize, value: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
@@ -198,159 +391,13 @@ fn relative(patterns: usize, pixels: usize, value: impl Fn(usize, usize) -> f64)
     values
 }
 
-/// Correlation of two lists over their values that are not zero in either.
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
-        // A dark pixel's ratios are mostly noise.
-        let a = a.clamp(-1.0, 1.0);
-        ab += a * b;
-        aa += a * a;
-        bb += b * b;
-    }
-    ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE)
-}
-
-/// Finds where photographs begin to show other patterns of the sequence.
-fn slipped(brightness: &[Vec<f64>], responses: &[Vec<f64>]) -> Option<CaptureFault> {
-    let count = brightness.len();
-    let best =
-        |photograph: &Vec<f64>| {
-            let correlations = responses
-                .iter()
-                .map(|response| correlation(photograph, response));
-            let best = correlations.enumerate().fold((0, 0.0), |best, other| {
-                if other.1 > best.1 { other } else { best }
-            });
-            best.0
-        };
-    let best: Vec<usize> = brightness.iter().map(best).collect();
-    let shows = |l: usize, by: isize| Some(best[l]) == l.checked_add_signed(by);
-    let unslipped = (0..count).filter(|&l| shows(l, 0)).count();
-    let mut found = None;
-    let mut most = (unslipped + MIN_AFFECTED).max((MIN_EXPLAINED_SHARE * count as f64) as usize);
-    for by in (-MAX_SLIP..=MAX_SLIP).filter(|by| *by != 0) {
-        let mut explained = (0..count).filter(|&l| shows(l, by)).count();
-        for first in 0..count {
-            // Those past the end of the sequence cannot be told.
-            if explained + by.unsigned_abs() > most {
-                most = explained + by.unsigned_abs();
-                found = Some(CaptureFault::Slipped { first, by });
-            }
-            explained += usize::from(shows(first, 0));
-            explained -= usize::from(shows(first, by));
-        }
-    }
-    found
-}
-
-/// Finds the symmetry of the light plane after which photographs show their patterns.
-fn wrong_correspondence(
-    measurements: &Measurements,
-    pixels: &[CameraPixel],
-    brightness: &[Vec<f64>],
-    own: &[f64],
-) -> Option<CaptureFault> {
-    let light = measurements.light;
-    let correlations = LightPlaneSymmetry::all(light).map(|symmetry| {
-        let change = |at| symmetry.apply(light, at);
-        let responses = relative_responses(measurements, pixels, change);
-        let pairs = brightness.iter().zip(&responses);
-        let correlations: Vec<f64> = pairs.map(|(a, b)| correlation(a, b)).collect();
-        (median(&correlations), symmetry)
-    });
-    let best = correlations.reduce(|best, other| if other.0 > best.0 { other } else { best })?;
-    let is_right = best.0 > MIN_CORRELATION && best.0 > 2.0 * median(own);
-    is_right.then_some(CaptureFault::Correspondence(best.1))
-}
-
-/// Finds when the picture shifted, by whole pixels.
-fn moved(
-    measurements: &Measurements,
-    pixels: &[CameraPixel],
-    responses: &[Vec<f64>],
-) -> Option<CaptureFault> {
-    let count = responses.len();
-    let quarter = count.div_ceil(4);
-    let first = shifts(measurements, pixels, responses, 0..quarter);
-    let last = shifts(measurements, pixels, responses, count - quarter..count);
-    let negative = |[x, y]: [i32; 2]| [-x, -y];
-    let moves = [(first, false), (last, true)]
-        .into_iter()
-        .filter_map(|(shifts, from_end)| {
-            // Shifts relative to the end are those before the move, with the other sign.
-            let affected = if from_end {
-                &shifts[..1]
-            } else {
-                &shifts[count - 1..]
-            };
-            let shift = affected[0];
-            let place = |l: usize, first: usize| match (l >= first) == from_end {
-                true => [0, 0],
-                false => shift,
-            };
-            let explained =
-                |first: usize| (0..count).filter(|&l| shifts[l] == place(l, first)).count();
-            let best = (MIN_AFFECTED..=count - MIN_AFFECTED)
-                .map(|first| (explained(first), first))
-                .fold(
-                    (0, 0),
-                    |best, other| if other.0 > best.0 { other } else { best },
-                );
-            let is_found = shift != [0, 0] && best.0 as f64 >= MIN_EXPLAINED_SHARE * count as f64;
-            let shift = if from_end { negative(shift) } else { shift };
-            is_found.then_some(CaptureFault::Moved {
-                first: best.1,
-                shift,
-            })
-        });
-    moves.into_iter().next()
-}
-
-/// The shift of every photograph relative to the place of `reference`, the photographs that tell the object's brightness.
-fn shifts(
-    measurements: &Measurements,
-    pixels: &[CameraPixel],
-    responses: &[Vec<f64>],
-    reference: std::ops::Range<usize>,
-) -> Vec<[i32; 2]> {
-    let sample = |l: usize, pixel: CameraPixel| measurements.sample(l, pixel, 1);
-    let brightness: Vec<f64> = pixels
+/// Correlation of a photograph with a pattern's responses, both relative; 0 where not measured.
+fn correlation(photograph: &[f64], response: &[f64]) -> f64 {
+    // A dark pixel's ratios are mostly noise.
+    let samples = photograph
         .iter()
-        .map(|&pixel| reference.clone().map(|l| sample(l, pixel)).sum::<f64>())
-        .collect();
-    let range = -MAX_MOVE..=MAX_MOVE;
-    let shifts = || {
-        range
-            .clone()
-            .flat_map(|y| range.clone().map(move |x| [x, y]))
-    };
-    let best = |l: usize| {
-        let predicted: Vec<f64> = brightness
-            .iter()
-            .zip(&responses[l])
-            .map(|(brightness, response)| brightness * (1.0 + response))
-            .collect();
-        let correlations = shifts().map(|[dx, dy]| {
-            let shifted = pixels.iter().map(|pixel| {
-                let (x, y) = (
-                    pixel.x.checked_add_signed(dx)?,
-                    pixel.y.checked_add_signed(dy)?,
-                );
-                let is_inside = x < measurements.camera.width && y < measurements.camera.height;
-                is_inside.then(|| sample(l, CameraPixel { x, y }))
-            });
-            (centred_correlation(shifted, &predicted), [dx, dy])
-        });
-        let best = correlations.fold(
-            (0.0, [0, 0]),
-            |best, other| {
-                if other.0 > best.0 { other } else { best }
-            },
-        );
-        best.1
-    };
-    (0..responses.len()).map(best).collect()
+        .map(|&y| (y != 0.0).then(|| y.clamp(-1.0, 1.0)));
+    centred_correlation(samples, response)
 }
 
 /// Correlation of the samples that are measured with their predictions, both less their means.
@@ -378,6 +425,7 @@ fn centred_correlation(samples: impl Iterator<Item = Option<f64>>, predicted: &[
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests {
     use super::*;
+    use crate::job_executor::SequentialExecutor;
     use crate::recover::test_problems::SyntheticCapture;
 
     const PATTERNS: usize = 40;
@@ -385,7 +433,13 @@ mod tests {
     fn fault(change: impl FnOnce(&mut Measurements)) -> Option<CaptureFault> {
         let mut capture = SyntheticCapture::with_variation(PATTERNS, 0.1);
         change(&mut capture.measurements);
-        diagnose(&capture.measurements, capture.geometry.window)
+        diagnose_shots(&capture, &(0..PATTERNS).collect::<Vec<_>>())
+    }
+
+    fn diagnose_shots(capture: &SyntheticCapture, shots: &[usize]) -> Option<CaptureFault> {
+        let window = capture.geometry.window;
+        let executor = &SequentialExecutor;
+        diagnose(&capture.measurements, window, shots, &[], executor).unwrap()
     }
 
     #[test]
@@ -394,6 +448,48 @@ mod tests {
         // Nor is one found where photographs show nothing that is known.
         let reversed = |measurements: &mut Measurements| measurements.photos.reverse();
         assert_eq!(fault(reversed), None);
+    }
+
+    #[test]
+    fn a_few_wrong_photographs_are_no_fault_of_the_capture() {
+        for (a, b) in [(3, 5), (36, 39), (38, 39), (0, 3)] {
+            let swap = |measurements: &mut Measurements| measurements.photos.swap(a, b);
+            assert_eq!(fault(swap), None);
+        }
+        for l in [0, 20, 39] {
+            let other = |measurements: &mut Measurements| measurements.photos[l].reverse();
+            assert_eq!(fault(other), None);
+            let shifted = |measurements: &mut Measurements| measurements.photos[l].rotate_right(1);
+            assert_eq!(fault(shifted), None);
+        }
+    }
+
+    #[test]
+    fn a_slip_is_told_in_positions_of_all_shots() {
+        // Every tenth shot is held out.
+        let shots: Vec<usize> = (0..PATTERNS).map(|l| l + l / 9).collect();
+        for (first, by) in [(10, 1), (10, 3), (0, 2), (20, -2)] {
+            let mut capture = SyntheticCapture::with_variation(PATTERNS, 0.1);
+            let photos = capture.measurements.photos.clone();
+            for (l, &shot) in shots.iter().enumerate().filter(|(_, shot)| **shot >= first) {
+                let shown = shot
+                    .checked_add_signed(by)
+                    .and_then(|shown| shots.iter().position(|s| *s == shown));
+                // The photograph of a pattern that is held out, which resembles none.
+                capture.measurements.photos[l] = match shown {
+                    Some(k) => photos[k].clone(),
+                    None => photos[l].iter().rev().copied().collect(),
+                };
+            }
+            let Some(CaptureFault::Slipped {
+                first: l,
+                by: found,
+            }) = diagnose_shots(&capture, &shots)
+            else {
+                panic!("{first} {by}");
+            };
+            assert_eq!((shots[l], found), (first, by));
+        }
     }
 
     #[test]

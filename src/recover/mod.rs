@@ -36,7 +36,7 @@ mod preparation_input;
 mod prepared_recovery;
 mod sampling;
 #[cfg(all(test, not(target_arch = "wasm32")))]
-mod test_problems;
+pub(crate) mod test_problems;
 mod window_size;
 
 pub use bpdn::{Homotopy, SparsityBasis};

@@ -82,7 +82,7 @@ const WINDOW: Window = match Window::new(5) {
 
 /// Noiseless measurements of pixels that all have one light transport function, or nearly, times a brightness of their
 /// own.
-pub(super) struct SyntheticCapture {
+pub(crate) struct SyntheticCapture {
     pub geometry: Geometry,
     /// The function, of sum 1, `[slot]`.
     pub function: Vec<f64>,

@@ -21,6 +21,8 @@ pub enum RandomStreamId {
     Pattern(u32),
     /// The noise of the photograph with this index.
     Photograph(u32),
+    /// The faults of a session.
+    Fault,
 }
 
 impl RandomStreamId {
@@ -30,6 +32,7 @@ impl RandomStreamId {
         rng.set_stream(match self {
             Self::Pattern(i) => u64::from(i) << 1,
             Self::Photograph(i) => u64::from(i) << 1 | 1,
+            Self::Fault => u64::MAX,
         });
         rng
     }

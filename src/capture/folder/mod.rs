@@ -22,6 +22,7 @@ pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 use self::capture_png::CapturePng;
 use self::files::CaptureFile;
 use super::camera_row_set::CameraRowSet;
+use super::code_statistics::CodeStatistics;
 use super::error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 use super::manifest::{GrayCodeShot, Manifest};
 use super::measurements::{LinearPhoto, Measurements, Pattern};
@@ -128,6 +129,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         let shots = shots.iter().map(|&i| &manifest.shots[i]);
         let mut names = vec![MANIFEST_NAME];
         names.extend(manifest.dark.as_deref());
+        names.extend(manifest.flood.as_deref());
         names.extend(shots.flat_map(|shot| [shot.pattern.as_str(), &shot.photo]));
         if manifest.correspondence.is_none() {
             names.extend(manifest.graycode.iter().map(|shot| shot.photo.as_str()));
@@ -278,7 +280,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             exposure,
             codes: file.open_rgb16()?,
             next_row: 0,
-            saturated_samples: 0,
+            statistics: CodeStatistics::default(),
         })
     }
 }

@@ -4,6 +4,7 @@ use super::capture_png::Rgb16RowReader;
 use super::disk_files::DiskFiles;
 use super::files::CaptureFiles;
 use crate::capture::camera_row_set::CameraRowSet;
+use crate::capture::code_statistics::CodeStatistics;
 use crate::capture::error::CaptureError;
 use crate::capture::manifest::ManifestCamera;
 use crate::capture::measurements::LinearPhoto;
@@ -26,7 +27,7 @@ pub struct PhotographRowReader<'a, F: CaptureFiles = DiskFiles> {
     pub(super) exposure: f64,
     pub(super) codes: Rgb16RowReader<'a, F>,
     pub(super) next_row: u32,
-    pub(super) saturated_samples: usize,
+    pub(super) statistics: CodeStatistics,
 }
 
 impl<F: CaptureFiles> PhotographRowReader<'_, F> {
@@ -44,25 +45,25 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
         self.read_to(end, rows, photo)
     }
 
-    /// Reads the whole photograph, as [`read`](Self::read) does, and its number of saturated samples.
+    /// Reads the whole photograph, as [`read`](Self::read) does, and the statistics of its codes.
     ///
     /// # Errors
     /// If the file is damaged or ends early.
-    pub fn read_all(mut self) -> Result<(LinearPhoto, usize), CaptureError> {
+    pub fn read_all(mut self) -> Result<(LinearPhoto, CodeStatistics), CaptureError> {
         let mut photo = Vec::with_capacity(self.camera.extent().area());
         self.read(&CameraRowSet::all(self.camera.height), &mut photo)?;
         Ok((photo, self.finish()?))
     }
 
-    /// Reads the rest of the file and returns the number of saturated samples in the photograph.
+    /// Reads the rest of the file and returns the statistics of the photograph's codes.
     ///
     /// # Errors
     /// If the file is damaged or ends early.
-    pub fn finish(mut self) -> Result<usize, CaptureError> {
+    pub fn finish(mut self) -> Result<CodeStatistics, CaptureError> {
         let none = CameraRowSet::from_strips([]);
         self.read_to(self.camera.height, &none, &mut LinearPhoto::new())?;
         self.codes.finish()?;
-        Ok(self.saturated_samples)
+        Ok(self.statistics)
     }
 
     /// Reads up to row `end` and appends those of `rows`.
@@ -81,7 +82,9 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
             let dark = &self.dark.light[self.next_row as usize * width..][..width];
             for (codes, dark) in codes.zip(dark) {
                 let saturated = codes.map(|code| f64::from(code) >= white);
-                self.saturated_samples += saturated.into_iter().filter(|s| *s).count();
+                for (code, is_saturated) in codes.into_iter().zip(saturated) {
+                    self.statistics.add(code, is_saturated);
+                }
                 if is_selected {
                     photo.push(std::array::from_fn::<_, CHANNELS, _>(|c| {
                         match saturated[c] {

@@ -13,7 +13,9 @@ use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
 use super::messages::{self, StrictError, UnusableError, Warning};
 use super::report::{RecoverReport, photograph_reports};
 use crate::capture::{CaptureFolder, DarkFrame, Measurements};
-use crate::cli::measurement_reader::{MeasurementReader, read_patterns, read_sample_of};
+use crate::cli::measurement_reader::{
+    MeasurementReader, ReadSample, read_patterns, read_sample_of,
+};
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, peak_rss_bytes};
 use crate::cli::progress;
@@ -21,7 +23,8 @@ use crate::export::{self, MIN_PLAUSIBLE_SNR, MemoryPlan, PreparedExport, Provena
 use crate::format::{EncodedFile, FormatError, Metadata};
 use crate::job_executor::{Cancelled, Executor};
 use crate::recover::{
-    MIN_PATTERNS, PreparedRecovery, RecoverError, TailEstimate, WindowSizeEstimate, diagnose,
+    MIN_PATTERNS, PhotographFault, PreparedRecovery, RecoverError, TailEstimate,
+    WindowSizeEstimate, diagnose,
 };
 use crate::transport::{Basis, Decibels};
 
@@ -75,14 +78,14 @@ impl RecoverJob<'_> {
         let checkpoint = Checkpoint::open(&self.args.output, &key, self.args.resume)?;
         let checkpoint = Mutex::new(checkpoint);
         let rows = self.plan.sample_rows();
-        let saturated = reader.read_sample(&mut measurements, &rows, self.cores);
-        let saturated = saturated.and_then(|saturated| {
+        let read = reader.read_sample(&mut measurements, &rows, self.cores);
+        let read = read.and_then(|read| {
             measurements.flood = flood
                 .map(|flood| read_sample_of(flood, &rows))
                 .transpose()?;
-            Ok(saturated)
+            Ok(read)
         });
-        let report = saturated.and_then(|n| self.recover(measurements, dark, n, &checkpoint));
+        let report = read.and_then(|read| self.recover(measurements, dark, read, &checkpoint));
         match &report {
             Ok(_) => lock(&checkpoint).delete_on_drop = true,
             Err(error) if error.is::<Cancelled>() => return Err(lock(&checkpoint).interrupted()),
@@ -96,33 +99,42 @@ impl RecoverJob<'_> {
         &self,
         measurements: Measurements,
         dark: DarkFrame,
-        saturated: usize,
+        read: ReadSample,
         checkpoint: &Mutex<Checkpoint>,
     ) -> Result<RecoverReport> {
+        let saturated = read.codes.saturated;
         let mut warnings = Warnings::default();
         warnings.add(messages::unknown_fields(self.folder));
+        warnings.add(messages::codes(&read.codes, self.folder));
         warnings.add(messages::saturation(saturated, &measurements));
         let prepared = self.prepare(&measurements)?;
         let recovery = &prepared.recovery;
         warnings.add(messages::preparation(&prepared));
-        let snr = prepared.expected_snr().filter(|_| !self.args.force);
-        let has_moved = recovery.faults().iter().any(|(_, fault)| fault.is_moved());
-        if snr.is_some_and(|snr| snr < MIN_PLAUSIBLE_SNR) && !has_moved {
-            self.check_capture(&measurements)?;
-        }
+        let snr = prepared.expected_snr();
+        let cause = match snr {
+            Some(snr) if snr < MIN_PLAUSIBLE_SNR => {
+                self.capture_fault(&measurements, recovery.faults())?
+            }
+            _ => None,
+        };
         warnings.add(messages::photographs(self.folder, self.shots, recovery));
-        warnings.check(self.args.strict)?;
-        if let Some(snr) = snr.filter(|snr| *snr < MIN_USABLE_SNR) {
-            bail!(UnusableError(snr));
+        let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !self.args.force);
+        match (cause, unusable) {
+            (Some(cause), Some(_)) => bail!("{cause}; --force writes the file nevertheless"),
+            (Some(cause), None) => warnings.add([messages::capture_warning(cause)]),
+            (None, Some(snr)) => bail!(UnusableError(snr)),
+            (None, None) => {}
         }
+        warnings.check(self.args.strict)?;
         let (method, window) = (self.args.method(), recovery.geometry().window);
         let rank = recovery.basis().map(Basis::rank);
         let encoders = self.plan.tiles_encoded_at_once(window, rank.unwrap_or(0));
         let encoders = encoders.map_err(messages::too_little_memory)?;
         lock(checkpoint).set_fingerprint(recovery_fingerprint(recovery))?;
         let noise = measurements.noise;
-        let overexposed =
-            self.recover_tiles(measurements, dark, recovery, checkpoint, saturated > 0)?;
+        let (overexposed, hot) =
+            self.recover_tiles(measurements, dark, recovery, checkpoint, &read)?;
+        messages::note_hot_pixels(hot);
         warnings.add(messages::overexposure(overexposed));
         warnings.check(self.args.strict)?;
         let provenance = Provenance::new(self.folder.manifest(), self.shots);
@@ -152,6 +164,7 @@ impl RecoverJob<'_> {
             strips: self.plan.strips(recovery.halo()).len(),
             saturated_samples: saturated,
             overexposed_pixels: overexposed,
+            hot_pixels: hot,
             file_bytes,
             photograph_reports: photograph_reports(self.folder, self.shots, recovery),
             warnings: warnings.given,
@@ -166,38 +179,42 @@ impl RecoverJob<'_> {
         let prepared = pollster::block_on(preparation);
         drop(spinner);
         prepared.or_else(|error| {
-            if matches!(
-                error,
-                RecoverError::MismatchedPatterns { .. } | RecoverError::UncorrelatedPatterns
-            ) {
-                self.check_capture(measurements)?;
-            }
-            Err(self.recover_error(error))
+            use RecoverError::{MismatchedPatterns, UncorrelatedPatterns};
+            let may_have_cause = matches!(error, MismatchedPatterns { .. } | UncorrelatedPatterns);
+            let cause = match may_have_cause {
+                true => self.capture_fault(measurements, &[])?,
+                false => None,
+            };
+            Err(cause.map_or_else(|| self.recover_error(error), Error::msg))
         })
     }
 
-    /// Fails if the capture as a whole has a fault whose cause is found.
-    fn check_capture(&self, measurements: &Measurements) -> Result<()> {
+    /// The fault of the capture as a whole, if one is found without the photographs that are `left_out`.
+    fn capture_fault(
+        &self,
+        measurements: &Measurements,
+        left_out: &[(usize, PhotographFault)],
+    ) -> Result<Option<String>> {
+        let _spinner = progress::spinner("looking for a cause");
         let window = self.args.window.unwrap_or(WindowSizeEstimate::MAX_WINDOW);
-        match diagnose(measurements, window) {
-            Some(fault) => {
-                let (folder, shots) = (self.folder, self.shots);
-                Err(messages::capture_fault(folder, shots, measurements, fault))
-            }
-            None => Ok(()),
-        }
+        let left_out: Vec<usize> = left_out.iter().map(|(l, _)| *l).collect();
+        let fault = diagnose(measurements, window, self.shots, &left_out, self.cores)?;
+        Ok(
+            fault
+                .map(|fault| messages::capture_fault(self.folder, self.shots, measurements, fault)),
+        )
     }
 
-    /// Recovers the tiles that the checkpoint lacks, strip by strip. Returns the number of overexposed pixels, which is
-    /// zero without `has_saturation`.
+    /// Recovers the tiles that the checkpoint lacks, strip by strip. Returns the numbers of overexposed and of hot
+    /// pixels.
     fn recover_tiles(
         &self,
         mut measurements: Measurements,
         dark: DarkFrame,
         recovery: &PreparedRecovery,
         checkpoint: &Mutex<Checkpoint>,
-        has_saturation: bool,
-    ) -> Result<usize> {
+        read: &ReadSample,
+    ) -> Result<(usize, usize)> {
         let geometry = recovery.geometry();
         let grid = geometry.tile_grid();
         let bar = progress::bar("recovering", grid.area());
@@ -208,11 +225,13 @@ impl RecoverJob<'_> {
             reader = Some(MeasurementReader::open(self.folder, &dark, self.shots)?);
             measurements.clear_rows();
         }
+        let has_saturation = read.codes.saturated > 0;
         let mut overexposed = 0;
+        let mut hot = if reader.is_some() { 0 } else { read.hot_pixels };
         for (tile_rows, rows) in self.plan.strips(recovery.halo()) {
             if let Some(reader) = &mut reader {
                 let check = || Ok(self.cores.check_cancelled()?);
-                reader.load_rows(&mut measurements, &rows, check)?;
+                hot += reader.load_rows(&mut measurements, &rows, check)?;
             }
             let recover_tile = |i: u32| -> Result<usize> {
                 let (i, rect) = (i as usize, geometry.tile(i as usize));
@@ -234,7 +253,7 @@ impl RecoverJob<'_> {
             overexposed += counts.try_reduce(|| 0, |a, b| Ok(a + b))?;
         }
         drop(bar);
-        Ok(overexposed)
+        Ok((overexposed, hot))
     }
 
     /// Encodes the tiles in `checkpoint`. An interruption is reported as [`Cancelled`].

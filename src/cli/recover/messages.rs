@@ -3,7 +3,7 @@
 use anyhow::{Error, anyhow};
 use serde::Serialize;
 
-use crate::capture::{CaptureFolder, Measurements};
+use crate::capture::{CaptureFolder, CodeStatistics, Measurements};
 use crate::cli::value_parsers::ByteCount;
 use crate::export::{
     MIN_PLAUSIBLE_SNR, PreparedExport, TooFewShots, TooLittleMemory, has_implausible_saturation,
@@ -69,6 +69,33 @@ pub fn unknown_fields(folder: &CaptureFolder) -> Option<Warning> {
             join_first(unknown.iter().cloned())
         ),
     })
+}
+
+/// Warns of codes that do not mean what the manifest says.
+pub fn codes(codes: &CodeStatistics, folder: &CaptureFolder) -> Vec<Warning> {
+    let manifest = folder.manifest_path().display().to_string();
+    let white = codes.undeclared_white().map(|code| Warning {
+        code: "saturation-undeclared",
+        message: format!(
+            "{manifest}: many samples have the code {code}, and hardly any those just below: they are saturated, but \
+             \"camera.white\" is {}; set it to {code}",
+            folder.manifest().camera.white
+        ),
+    });
+    let eight_bits = (codes.step() > 1).then(|| Warning {
+        code: "photographs-8-bit",
+        message: "the photographs have codes of 8 bits in files of 16: dark parts are inaccurate. Export 16 bits, linear, from \
+                  the camera's raw files"
+            .to_owned(),
+    });
+    white.into_iter().chain(eight_bits).collect()
+}
+
+/// Notes pixels that are filled from their neighbours.
+pub fn note_hot_pixels(count: usize) {
+    if count > 0 {
+        eprintln!("note: {count} hot pixels are filled from their neighbours");
+    }
 }
 
 /// Notes saturated samples, and warns if there are too many.
@@ -205,8 +232,8 @@ fn trembling(recovery: &PreparedRecovery) -> Option<Warning> {
     Some(Warning {
         code: "camera-trembled",
         message: format!(
-            "the camera trembled: pictures are shifted by {shift:.2} pixels (root mean square) from one photograph to \
-             another. This is corrected, but costs accuracy; fasten the camera, or wait before each photograph"
+            "the camera moved between photographs: pictures are shifted by {shift:.2} pixels (root mean square). This is \
+             corrected, but costs accuracy; fasten the camera, or wait before each photograph"
         ),
     })
 }
@@ -259,19 +286,20 @@ fn note_corrections<'a>(recovery: &PreparedRecovery, name: &dyn Fn(usize) -> &'a
     }
 }
 
-/// The error for a capture that has `fault`; `shots` are those of the measurements.
+/// What is wrong with a capture that has `fault`; `shots` are those of the measurements.
 pub fn capture_fault(
     folder: &CaptureFolder,
     shots: &[usize],
     measurements: &Measurements,
     fault: CaptureFault,
-) -> anyhow::Error {
+) -> String {
     let listed = &folder.manifest().shots;
     let shot = |l: usize| format!("shots[{}] ({})", shots[l], listed[shots[l]].photo);
+    // Held-out shots may lie between.
     let before = |first: usize| match first >= MIN_PATTERNS {
         true => format!(
             ", or recover from the shots before with --patterns {}",
-            shots[first]
+            shots[first - 1] + 1
         ),
         false => String::new(),
     };
@@ -321,14 +349,23 @@ pub fn capture_fault(
             ];
             let distances: Vec<String> = distances.into_iter().flatten().collect();
             format!(
-                "the camera or the object moved before {}, by about {}: take the shots before or after the move out{}",
+                "the camera or the object moved before {}, by about {}: remove the shots before the move, or those after \
+                 it{}",
                 shot(first),
                 distances.join(" and "),
                 before(first),
             )
         }
     };
-    anyhow!("{}: {text}", folder.manifest_path().display())
+    format!("{}: {text}", folder.manifest_path().display())
+}
+
+/// The warning of a capture that is recovered although it has a fault.
+pub fn capture_warning(message: String) -> Warning {
+    Warning {
+        code: "capture-fault",
+        message,
+    }
 }
 
 /// The error for `shots` whose photographs do not match their patterns.

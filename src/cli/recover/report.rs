@@ -40,6 +40,8 @@ pub struct RecoverReport {
     pub saturated_samples: usize,
     /// Pixels saturated in nearly all photographs.
     pub overexposed_pixels: usize,
+    /// Number of hot pixels, which are filled from their neighbours.
+    pub hot_pixels: usize,
     pub file_bytes: u64,
     /// One for each photograph that was read.
     #[serde(rename = "photograph_table")]

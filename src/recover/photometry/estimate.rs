@@ -6,8 +6,8 @@
 use super::equations::{self, CorrectionStep, MAX_PHOTOGRAPHS};
 use super::resampling::MAX_SHIFT;
 use super::{
-    CalibratedMeasurements, PhotographCorrection, PhotographFault, Photometry, ResamplingInput,
-    faults,
+    CalibratedMeasurements, PhotographCorrection, PhotographFault, Photometry,
+    ResampledPhotographs, ResamplingInput, faults,
 };
 use crate::job_executor::{Cancelled, Executor};
 use crate::linalg::{self, median};
@@ -159,7 +159,16 @@ pub(in crate::recover) async fn estimate(
     {
         corrections.clear();
     }
+    let input = ResamplingInput {
+        measurements,
+        corrections: &corrections,
+        geometry: &preparation.geometry,
+        mean_function: &mean_function,
+        used: &used,
+    };
+    let resampled = ResampledPhotographs::of_picture(input);
     let calibrated = CalibratedMeasurements::new(measurements, &corrections);
+    let calibrated = calibrated.with_resampled(resampled.as_ref());
     let preparation = preparation.with(&calibrated);
     let faults = faults::classify(&preparation, &mean_function, &squares, &used, &outliers);
     let mut faults = faults.await?;

@@ -29,9 +29,9 @@ const SHIFT_VARIANCE: f64 = 0.05;
 const VARIANCE_DECAY: f64 = 0.1;
 /// Variance of what no function explains, relative to brightness.
 const UNEXPLAINED_VARIANCE: f64 = 1e-4;
-/// Most camera pixels that preparing a recovery uses, in blocks of [`SMALL_BLOCK_SIDE`]: training regions with their
-/// neighbours, and the squares of the other estimates.
-const MAX_PREPARED_PIXELS: usize = 1300 * (SMALL_BLOCK_SIDE * SMALL_BLOCK_SIDE) as usize;
+/// Most camera pixels that preparing a recovery uses, in blocks of [`SMALL_BLOCK_SIDE`]: 64 training regions with their
+/// neighbours touch 16 blocks each, 96 validated squares 9, and 176 other squares one.
+const MAX_PREPARED_PIXELS: usize = 2064 * (SMALL_BLOCK_SIDE * SMALL_BLOCK_SIDE) as usize;
 /// Side of a block in camera pixels: of a picture that may be resampled whole, and of a larger one.
 const BLOCK_SIDE: u32 = Geometry::DEFAULT_TILE_SIDE;
 const SMALL_BLOCK_SIDE: u32 = 8;
@@ -92,7 +92,10 @@ impl<'a> ResampledPhotographs<'a> {
     }
 
     fn new(input: ResamplingInput<'a>, rect: TileRect, block: Extent) -> Option<Self> {
-        let is_shifted = input.corrections.iter().any(|c| c.is_shifted());
+        let corrections = input.used.iter().map(|&l| input.corrections.get(l));
+        let is_shifted = corrections
+            .flatten()
+            .any(|correction| correction.is_shifted());
         let (columns, rows) = blocks(rect, block);
         is_shifted.then(|| Self {
             input,

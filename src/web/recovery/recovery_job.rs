@@ -260,7 +260,8 @@ impl Recovery {
             .filter(|fault| !fault.1.is_moved() || first == Some(fault));
         let warnings = told.map(|&(l, fault)| fault_warning(shots, l, fault, count));
         let shift = self.recovery().trembling();
-        let trembled = shift.map(|shift| format!("camera-trembled {}", (100.0 * shift) as u32));
+        let trembled =
+            shift.map(|shift| format!("camera-trembled {}", (100.0 * shift + 0.5) as u32));
         doubts.chain(warnings).chain(trembled).collect()
     }
 }

@@ -11,7 +11,9 @@ const MAX_AUTO_WINDOW = 31;
 const MAX_DEFAULT_WORKERS = 4;
 /** Camera pixels along a side of a recovered tile, and around it. */
 const TILE_SIDE = 32;
-const HALO = 8;
+const HALO = 10;
+/** Most camera pixels whose samples are resampled while a recovery is prepared, if the camera trembled. */
+const MAX_RESAMPLED_PIXELS = 132_096;
 const PIXEL_BYTES = 12;
 /** Of the preparation, what every worker of a group does. */
 const UNDIVIDED_SHARE = 0.25;
@@ -73,12 +75,18 @@ function memoryBytes(
   const each = 24 * 2 ** 20 + 8 * area * area * 16 + 2 * PIXEL_BYTES * tile * area;
   const patterns = PIXEL_BYTES * photographs * lightWidth * lightHeight;
   const measurements = PIXEL_BYTES * photographs * pixels + patterns;
+  const resampled = PIXEL_BYTES * photographs * Math.min(pixels, MAX_RESAMPLED_PIXELS);
   const all = workers * each + measurements + 8 * pixels * area;
   const strips = 2 * PIXEL_BYTES * photographs * rows + patterns;
   // Measurements are packed before they are sent, and each worker has the packed ones for a while: in its memory, and as
   // JavaScript's array. Those of the coordinator grow by doubling.
   const packed = 3 * measurements + 3 * (workers - 1) * measurements;
-  return { alone: all + (workers - 1) * strips, together: workers > 1 ? all + packed : all };
+  // Nothing is resampled before everything is sent.
+  const shared = Math.max(packed, workers * resampled);
+  return {
+    alone: all + resampled + (workers - 1) * strips,
+    together: all + (workers > 1 ? shared : resampled),
+  };
 }
 
 /** Expected time of each stage of `recover`. */

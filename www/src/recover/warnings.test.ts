@@ -72,7 +72,7 @@ test('each photograph that is left out has a warning of its own, which names its
       ]),
       [
         'camera-trembled',
-        'The camera trembled: pictures are shifted by 0.12 pixels (root mean square) from one photograph to another. ' +
+        'The camera moved between photographs: pictures are shifted by 0.12 pixels (root mean square). ' +
           'This is corrected, but costs accuracy. Fasten the camera, or wait before each photograph.',
       ],
     ],

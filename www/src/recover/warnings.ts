@@ -62,7 +62,7 @@ function faultMessages([shot, other, percent]: string[]): Record<PhotographFault
 function tremblingMessage([hundredths]: string[]): Record<'camera-trembled', string> {
   return {
     'camera-trembled':
-      `The camera trembled: pictures are shifted by ${(Number(hundredths) / 100).toFixed(2)} pixels (root mean square) ` +
-      'from one photograph to another. This is corrected, but costs accuracy. Fasten the camera, or wait before each photograph.',
+      `The camera moved between photographs: pictures are shifted by ${(Number(hundredths) / 100).toFixed(2)} pixels ` +
+      '(root mean square). This is corrected, but costs accuracy. Fasten the camera, or wait before each photograph.',
   };
 }

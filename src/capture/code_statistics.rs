@@ -1,0 +1,128 @@
+//! What the codes of photographs say of the camera: saturation, declared or not, and codes of 8 bits.
+
+/// Samples with the highest code that are so many, and so many times those with the next lower code, are saturated.
+const MIN_PILE: usize = 64;
+const MIN_PILE_RATIO: usize = 8;
+/// 8-bit codes are scaled to 16 bits by one of these factors.
+const EIGHT_BIT_FACTORS: [u16; 2] = [257, 256];
+
+/// Counts of the codes of photographs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CodeStatistics {
+    /// Number of samples that are at white or above.
+    pub saturated: usize,
+    /// The highest code below white and the next lower one, each with the number of its samples.
+    highest: [(u16, usize); 2],
+    /// Whether all codes are multiples of each of [`EIGHT_BIT_FACTORS`].
+    are_multiples: [bool; 2],
+}
+
+impl Default for CodeStatistics {
+    fn default() -> Self {
+        Self {
+            saturated: 0,
+            highest: [(0, 0); 2],
+            are_multiples: [true; 2],
+        }
+    }
+}
+
+impl CodeStatistics {
+    /// Counts a sample.
+    pub fn add(&mut self, code: u16, is_saturated: bool) {
+        for (are_multiples, factor) in self.are_multiples.iter_mut().zip(EIGHT_BIT_FACTORS) {
+            *are_multiples &= code % factor == 0;
+        }
+        match is_saturated {
+            true => self.saturated += 1,
+            false => self.count(code, 1),
+        }
+    }
+
+    /// Adds the counts of another photograph.
+    pub fn merge(mut self, other: Self) -> Self {
+        self.saturated += other.saturated;
+        for (code, count) in other.highest {
+            self.count(code, count);
+        }
+        for (own, other) in self.are_multiples.iter_mut().zip(other.are_multiples) {
+            *own &= other;
+        }
+        self
+    }
+
+    fn count(&mut self, code: u16, count: usize) {
+        let [first, second] = &mut self.highest;
+        if code == first.0 {
+            first.1 += count;
+        } else if code > first.0 {
+            (*first, *second) = ((code, count), *first);
+        } else if code == second.0 {
+            second.1 += count;
+        } else if code > second.0 {
+            *second = (code, count);
+        }
+    }
+
+    /// The code below white at which samples are saturated, if there is one: they pile up there.
+    pub fn undeclared_white(&self) -> Option<u16> {
+        let [(code, count), (_, next)] = self.highest;
+        (count >= MIN_PILE && count >= MIN_PILE_RATIO * next.max(1)).then_some(code)
+    }
+
+    /// Distance of the codes.
+    pub fn step(&self) -> u16 {
+        let factors = self.are_multiples.into_iter().zip(EIGHT_BIT_FACTORS);
+        let mut steps =
+            factors.filter_map(|(are_multiples, factor)| are_multiples.then_some(factor));
+        steps.next().unwrap_or(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn statistics(codes: impl IntoIterator<Item = u16>, white: u16) -> CodeStatistics {
+        let mut statistics = CodeStatistics::default();
+        codes
+            .into_iter()
+            .for_each(|code| statistics.add(code, code >= white));
+        statistics
+    }
+
+    /// Codes of a photograph: many values, none of them often.
+    fn codes(count: u32) -> impl Iterator<Item = u16> {
+        (0..count).map(|i| (600 + i.wrapping_mul(2_654_435_761) % 40_000) as u16)
+    }
+
+    #[test]
+    fn samples_that_pile_up_below_white_are_found_in_all_photographs_together() {
+        let clean = statistics(codes(9000), 60_000);
+        assert_eq!((clean.saturated, clean.undeclared_white()), (0, None));
+        let clipped = |part: u32| {
+            statistics(
+                codes(9000)
+                    .skip(3000 * part as usize)
+                    .take(3000)
+                    .map(|code| code.min(40_000)),
+                60_000,
+            )
+        };
+        let merged = clipped(0).merge(clipped(1)).merge(clipped(2));
+        assert_eq!(merged.undeclared_white(), Some(40_000));
+        // Declared, it is counted.
+        let declared = statistics(codes(9000).map(|code| code.min(40_000)), 40_000);
+        assert!(declared.saturated > 64 && declared.undeclared_white().is_none());
+    }
+
+    #[test]
+    fn codes_of_eight_bits_are_told_and_their_brightest_is_no_saturation() {
+        for factor in EIGHT_BIT_FACTORS {
+            let eight_bits = statistics(codes(9000).map(|code| code / 257 * factor), 65_535);
+            assert_eq!(eight_bits.step(), factor);
+            assert_eq!(eight_bits.undeclared_white(), None);
+        }
+        assert_eq!(statistics(codes(9000), 60_000).step(), 1);
+    }
+}

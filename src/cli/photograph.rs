@@ -1,0 +1,251 @@
+//! `ltm-export photograph`: photographs a capture's known transport again, with faults.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
+
+use super::{output_folder, progress};
+use crate::capture::{
+    CaptureFolder, GrayCodeShot, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, Pattern, Shot,
+};
+use crate::simulate::{Camera, GrayCodePattern, PatternImage, RandomStreamId, SessionFault};
+use crate::transport::{CHANNELS, Extent};
+
+/// Photograph the known transport of a capture again, with faults of rigs
+#[derive(Debug, Args)]
+pub struct PhotographArgs {
+    /// Capture folder with truth/
+    #[arg(value_name = "CAPTURE")]
+    capture: PathBuf,
+    /// Capture folder to write; must be new or empty
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Fault, with its size if it is not this one; can be given several times: underexposed=0.5, object, pattern, blend=0.5,
+    /// swap, slip, jitter=0.02, drift=0.05, exposure=0.05, room=0.01, growing-room=0.02, tremble=0.2, move=0.5, mirror,
+    /// gamma=1.8, dimming=0.15, srgb, clip=0.4, defects=0.001, 8-bit
+    #[arg(long = "fault", value_name = "NAME[=SIZE]")]
+    faults: Vec<SessionFault>,
+    /// Seed of noise and faults
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Electrons at full scale; fewer mean more noise
+    #[arg(long, value_name = "N", default_value_t = 40_000,
+          value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
+    electrons: u64,
+}
+
+pub fn run(args: &PhotographArgs) -> Result<()> {
+    let folder = CaptureFolder::open(&args.capture)?;
+    let missing =
+        "has no truth/ folder, so its transport is unknown and it cannot be photographed again";
+    let truth = folder.truth()?.context(missing);
+    let truth = truth.with_context(|| args.capture.display().to_string())?;
+    let session = photograph(args, &folder, &truth)?;
+    output_folder::write_atomically(&args.output, |root| session.write(&args.capture, root))?;
+    eprintln!(
+        "{}: {} shots, {} faults",
+        args.output.display(),
+        session.manifest.shots.len(),
+        args.faults.len()
+    );
+    Ok(())
+}
+
+/// A session of photographs, in memory.
+struct Session {
+    manifest: Manifest,
+    /// Pattern files of the original capture, with their new names.
+    patterns: Vec<(String, String)>,
+    /// Names and codes.
+    photographs: Vec<(String, Vec<[u16; CHANNELS]>)>,
+    camera: Extent,
+}
+
+fn photograph(
+    args: &PhotographArgs,
+    folder: &CaptureFolder,
+    truth: &GroundTruth,
+) -> Result<Session> {
+    let original = folder.manifest();
+    let (light, camera) = (truth.light_plane, truth.camera);
+    let mut manifest = original.clone();
+    (manifest.camera.black, manifest.camera.white) = (Camera::BLACK, Camera::WHITE);
+    manifest.dark = Some("photos/dark.png".to_owned());
+    manifest.flood = Some("photos/flood.png".to_owned());
+    let gray_code = GrayCodePattern::all(light);
+    let is_listed = |code: &GrayCodePattern| {
+        let mut shots = original.graycode.iter();
+        shots.any(|shot| {
+            (shot.axis, shot.bit, shot.inverted) == (code.axis, code.bit, code.inverted)
+        })
+    };
+    let gray_code: Vec<GrayCodePattern> = gray_code.into_iter().filter(is_listed).collect();
+    let shots = 0..original.shots.len();
+    let patterns = shots
+        .clone()
+        .into_par_iter()
+        .map(|i| folder.read_pattern(i));
+    let patterns = patterns.collect::<Result<Vec<Pattern>, _>>()?;
+    let random = || RandomStreamId::Fault.start(args.seed);
+    let mut pictures: Vec<Vec<Vec<f32>>> = Vec::new();
+    let bar = progress::bar("photographing", CHANNELS);
+    for c in 0..CHANNELS {
+        let mut emissions: Vec<Vec<f32>> = patterns
+            .iter()
+            .map(|pattern| pattern.plane(c).to_vec())
+            .collect();
+        let uniform = |emission: f32| vec![emission; light.area()];
+        let mut others = vec![uniform(0.0), uniform(1.0)];
+        others.extend(gray_code.iter().map(|code| match code.codes(light) {
+            PatternImage::Grey(codes) => {
+                codes.iter().map(|&code| f32::from(code) / 255.0).collect()
+            }
+            PatternImage::Rgb(_) => Vec::new(),
+        }));
+        // Every channel's faults are the same.
+        let mut random = random();
+        for fault in &args.faults {
+            fault.change_emissions(&mut emissions, &mut others, &mut random);
+        }
+        emissions.extend(others);
+        pictures.push(channel_pictures(truth, c, &emissions));
+        bar.inc(1);
+    }
+    let mut pictures = interleave(&pictures);
+    let mut others = pictures.split_off(original.shots.len());
+    let mut random = random();
+    for fault in &args.faults {
+        fault.change_pictures(camera, &mut pictures, &mut random);
+        fault.change_manifest(&mut manifest);
+    }
+    for (picture, shot) in pictures.iter_mut().zip(&original.shots) {
+        let exposure = shot.exposure.unwrap_or(1.0) as f32;
+        picture
+            .as_flattened_mut()
+            .iter_mut()
+            .for_each(|y| *y *= exposure);
+    }
+    let mut names: Vec<String> = (0..pictures.len())
+        .map(|i| format!("photos/{i:04}.png"))
+        .collect();
+    names.extend(["photos/dark.png", "photos/flood.png"].map(str::to_owned));
+    manifest.graycode.clear();
+    for code in &gray_code {
+        let sign = if code.inverted { 'n' } else { 'p' };
+        let photo = format!("graycode/{}{}{sign}.png", code.axis, code.bit);
+        names.push(photo.clone());
+        manifest.graycode.push(GrayCodeShot {
+            photo,
+            axis: code.axis,
+            bit: code.bit,
+            inverted: code.inverted,
+        });
+    }
+    pictures.append(&mut others);
+    let sensor = Camera {
+        electrons: args.electrons as f64,
+    };
+    let expose = |(i, (name, picture)): (usize, (String, LinearPhoto))| {
+        let mut noise = RandomStreamId::Photograph(i as u32).start(args.seed);
+        let mut codes = sensor.photograph(&picture, &mut noise);
+        args.faults
+            .iter()
+            .for_each(|fault| fault.change_codes(&mut codes));
+        (name, codes)
+    };
+    let named: Vec<(String, LinearPhoto)> = names.into_iter().zip(pictures).collect();
+    let photographs = named.into_par_iter().enumerate().map(expose).collect();
+    let renamed = |(i, shot): (usize, &Shot)| Shot {
+        pattern: format!("patterns/{i:04}.png"),
+        photo: format!("photos/{i:04}.png"),
+        exposure: shot.exposure,
+    };
+    manifest.shots = original.shots.iter().enumerate().map(renamed).collect();
+    let patterns = original.shots.iter().zip(&manifest.shots);
+    let patterns = patterns.map(|(old, new)| (old.pattern.clone(), new.pattern.clone()));
+    Ok(Session {
+        patterns: patterns.collect(),
+        manifest,
+        photographs,
+        camera,
+    })
+}
+
+/// Pictures `[light][N]` of channel `c` under lights with `emissions`, `[light][M]`.
+fn channel_pictures(truth: &GroundTruth, c: usize, emissions: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    let (count, light) = (emissions.len(), truth.light_plane);
+    // The lights' emissions of one element are contiguous.
+    let by_element: Vec<f32> = (0..light.area())
+        .flat_map(|m| emissions.iter().map(move |light| light[m]))
+        .collect();
+    let pixel = |n: usize| {
+        let mut sums = vec![0.0f32; count];
+        for (slot, tau) in truth.tau(n).iter().enumerate() {
+            let tau = tau[c].to_f32();
+            let element = truth.window.element(truth.window_origin(n), slot);
+            if let Some(m) = element.index_in(light).filter(|_| tau != 0.0) {
+                let emissions = &by_element[m * count..(m + 1) * count];
+                sums.iter_mut()
+                    .zip(emissions)
+                    .for_each(|(sum, e)| *sum += tau * e);
+            }
+        }
+        sums
+    };
+    let by_pixel: Vec<Vec<f32>> = (0..truth.camera.area())
+        .into_par_iter()
+        .map(pixel)
+        .collect();
+    (0..count)
+        .map(|i| by_pixel.iter().map(|sums| sums[i]).collect())
+        .collect()
+}
+
+/// Pictures of all channels from those of each, `[channel][light][N]`.
+fn interleave(channels: &[Vec<Vec<f32>>]) -> Vec<LinearPhoto> {
+    let picture = |i: usize| {
+        let pixels = 0..channels[0][i].len();
+        pixels
+            .map(|n| std::array::from_fn(|c| channels[c][i][n]))
+            .collect()
+    };
+    (0..channels[0].len()).map(picture).collect()
+}
+
+impl Session {
+    fn write(&self, original: &Path, root: &Path) -> Result<()> {
+        for folder in ["patterns", "photos", "graycode", "truth"] {
+            std::fs::create_dir(root.join(folder)).context(folder)?;
+        }
+        let json = serde_json::to_string_pretty(&self.manifest)?;
+        std::fs::write(root.join(MANIFEST_NAME), json + "\n").context(MANIFEST_NAME)?;
+        for (old, new) in &self.patterns {
+            std::fs::copy(original.join(old), root.join(new)).with_context(|| old.clone())?;
+        }
+        for entry in std::fs::read_dir(original.join("truth")).context("truth")? {
+            let path = entry.context("truth")?.path();
+            if let Some(name) = path.file_name().filter(|_| path.is_file()) {
+                let copy = std::fs::copy(&path, root.join("truth").join(name));
+                copy.with_context(|| path.display().to_string())?;
+            }
+        }
+        self.photographs.par_iter().try_for_each(|(name, codes)| {
+            let path = root.join(name);
+            let write = || -> Result<()> {
+                let file = std::io::BufWriter::new(std::fs::File::create(&path)?);
+                let Extent { width, height } = self.camera;
+                image::codecs::png::PngEncoder::new(file).write_image(
+                    bytemuck::cast_slice(codes),
+                    width,
+                    height,
+                    ExtendedColorType::Rgb16,
+                )?;
+                Ok(())
+            };
+            write().with_context(|| path.display().to_string())
+        })
+    }
+}
