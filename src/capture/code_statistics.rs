@@ -31,7 +31,7 @@ impl CodeStatistics {
     /// Counts a sample.
     pub fn add(&mut self, code: u16, is_saturated: bool) {
         for (are_multiples, factor) in self.are_multiples.iter_mut().zip(EIGHT_BIT_FACTORS) {
-            *are_multiples &= code % factor == 0;
+            *are_multiples &= code.is_multiple_of(factor);
         }
         match is_saturated {
             true => self.saturated += 1,

@@ -285,7 +285,7 @@ impl<E: Executor> Search<'_, E> {
     fn moved(&self, responses: &[Vec<f64>]) -> Option<CaptureFault> {
         let count = self.used.len();
         let quarter = count / 4;
-        let found = [(0..quarter, false), (count - quarter..count, true)]
+        [(0..quarter, false), (count - quarter..count, true)]
             .into_iter()
             .filter_map(|(reference, is_end)| {
                 let shifts = self.shifts(responses, reference);
@@ -317,8 +317,7 @@ impl<E: Executor> Search<'_, E> {
                 let first = self.used[best.1];
                 (shift != [0, 0] && best.0 > 0).then_some(CaptureFault::Moved { first, shift })
             })
-            .next();
-        found
+            .next()
     }
 
     /// The shift of every photograph relative to the place of `reference`, the photographs that tell the object's
@@ -439,7 +438,8 @@ mod tests {
     fn diagnose_shots(capture: &SyntheticCapture, shots: &[usize]) -> Option<CaptureFault> {
         let window = capture.geometry.window;
         let executor = &SequentialExecutor;
-        diagnose(&capture.measurements, window, shots, &[], executor).unwrap()
+        let fault = diagnose(&capture.measurements, window, shots, &[], executor);
+        fault.unwrap_or_else(|error| panic!("{error}"))
     }
 
     #[test]
