@@ -1,7 +1,8 @@
 //! What the codes of photographs say of the camera: saturation, declared or not, and codes of 8 bits.
 
-/// Samples with the highest code that are so many, and so many times those with the next lower code, are saturated.
-const MIN_PILE: usize = 64;
+/// Samples with the highest code that are so many a photograph, more than of a few stuck pixels, and so many times those
+/// with the next lower code, are saturated.
+const MIN_PILE: usize = 16;
 const MIN_PILE_RATIO: usize = 8;
 /// 8-bit codes are scaled to 16 bits by one of these factors.
 const EIGHT_BIT_FACTORS: [u16; 2] = [257, 256];
@@ -11,6 +12,7 @@ const EIGHT_BIT_FACTORS: [u16; 2] = [257, 256];
 pub struct CodeStatistics {
     /// Number of samples that are at white or above.
     pub saturated: usize,
+    photographs: usize,
     /// The highest code below white and the next lower one, each with the number of its samples.
     highest: [(u16, usize); 2],
     /// Whether all codes are multiples of each of [`EIGHT_BIT_FACTORS`].
@@ -20,6 +22,7 @@ pub struct CodeStatistics {
 impl Default for CodeStatistics {
     fn default() -> Self {
         Self {
+            photographs: 0,
             saturated: 0,
             highest: [(0, 0); 2],
             are_multiples: [true; 2],
@@ -28,6 +31,14 @@ impl Default for CodeStatistics {
 }
 
 impl CodeStatistics {
+    /// Of a photograph without samples yet.
+    pub fn of_photograph() -> Self {
+        Self {
+            photographs: 1,
+            ..Self::default()
+        }
+    }
+
     /// Counts a sample.
     pub fn add(&mut self, code: u16, is_saturated: bool) {
         for (are_multiples, factor) in self.are_multiples.iter_mut().zip(EIGHT_BIT_FACTORS) {
@@ -41,6 +52,7 @@ impl CodeStatistics {
 
     /// Adds the counts of another photograph.
     pub fn merge(mut self, other: Self) -> Self {
+        self.photographs += other.photographs;
         self.saturated += other.saturated;
         for (code, count) in other.highest {
             self.count(code, count);
@@ -67,11 +79,15 @@ impl CodeStatistics {
     /// The code below white at which samples are saturated, if there is one: they pile up there.
     pub fn undeclared_white(&self) -> Option<u16> {
         let [(code, count), (_, next)] = self.highest;
-        (count >= MIN_PILE && count >= MIN_PILE_RATIO * next.max(1)).then_some(code)
+        let is_pile = count >= MIN_PILE * self.photographs && count >= MIN_PILE_RATIO * next.max(1);
+        (code > 0 && is_pile).then_some(code)
     }
 
     /// Distance of the codes.
     pub fn step(&self) -> u16 {
+        if self.highest[1].0 == 0 {
+            return 1; // all photographs are black, or have one code
+        }
         let factors = self.are_multiples.into_iter().zip(EIGHT_BIT_FACTORS);
         let mut steps =
             factors.filter_map(|(are_multiples, factor)| are_multiples.then_some(factor));
@@ -84,7 +100,7 @@ mod tests {
     use super::*;
 
     fn statistics(codes: impl IntoIterator<Item = u16>, white: u16) -> CodeStatistics {
-        let mut statistics = CodeStatistics::default();
+        let mut statistics = CodeStatistics::of_photograph();
         codes
             .into_iter()
             .for_each(|code| statistics.add(code, code >= white));
@@ -111,6 +127,13 @@ mod tests {
         };
         let merged = clipped(0).merge(clipped(1)).merge(clipped(2));
         assert_eq!(merged.undeclared_white(), Some(40_000));
+        // A stuck pixel in each of many photographs is none.
+        let stuck = (0..40)
+            .map(|_| statistics(codes(3000).map(|code| code / 2).chain([50_000; 3]), 60_000));
+        let stuck = stuck.fold(CodeStatistics::default(), CodeStatistics::merge);
+        assert_eq!(stuck.undeclared_white(), None);
+        let black = statistics([0; 9000], 60_000);
+        assert_eq!((black.undeclared_white(), black.step()), (None, 1));
         // Declared, it is counted.
         let declared = statistics(codes(9000).map(|code| code.min(40_000)), 40_000);
         assert!(declared.saturated > 64 && declared.undeclared_white().is_none());

@@ -14,7 +14,7 @@ impl Measurements {
     /// Replaces the samples of hot pixels by the means of their neighbours in the row. Returns their number.
     pub fn fill_hot_pixels(&mut self) -> usize {
         let width = self.camera.width as usize;
-        if width < 3 {
+        if width < 2 {
             return 0;
         }
         let mut filled = 0;
@@ -23,10 +23,10 @@ impl Measurements {
                 .map(|n| self.saturated_share(n))
                 .collect();
             for x in 0..width {
-                // At the border, the second neighbour.
+                // At the border, the only one.
                 let neighbours = match x {
-                    0 => [1, 2],
-                    x if x + 1 == width => [x - 1, x - 2],
+                    0 => [1, 1],
+                    x if x + 1 == width => [x - 1, x - 1],
                     x => [x - 1, x + 1],
                 };
                 let is_steady = neighbours
@@ -73,7 +73,7 @@ mod tests {
             for n in 0..clean.len() {
                 let expected = match n {
                     n if n == hot => 0.5 * (clean[n - 1][1] + clean[n + 1][1]),
-                    n if n == corner => 0.5 * (clean[n - 1][1] + clean[n - 2][1]),
+                    n if n == corner => clean[n - 1][1],
                     n => clean[n][1],
                 };
                 assert!((photo[n][1] - expected).abs() < 1e-6, "pixel {n}");

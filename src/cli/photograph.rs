@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
@@ -70,6 +70,15 @@ fn photograph(
     truth: &GroundTruth,
 ) -> Result<Session> {
     let original = folder.manifest();
+    ensure!(
+        original.correspondence.is_some()
+            || args
+                .faults
+                .iter()
+                .all(|fault| !fault.is_of_correspondence()),
+        "{}: has no \"correspondence\" that could be mirrored",
+        folder.manifest_path().display()
+    );
     let (light, camera) = (truth.light_plane, truth.camera);
     let mut manifest = original.clone();
     (manifest.camera.black, manifest.camera.white) = (Camera::BLACK, Camera::WHITE);
@@ -158,8 +167,13 @@ fn photograph(
     };
     let named: Vec<(String, LinearPhoto)> = names.into_iter().zip(pictures).collect();
     let photographs = named.into_par_iter().enumerate().map(expose).collect();
+    // Exposures of one pattern share its file.
+    let first = |shot: &Shot| {
+        let same = |other: &Shot| other.pattern == shot.pattern;
+        original.shots.iter().position(same).unwrap_or(0)
+    };
     let renamed = |(i, shot): (usize, &Shot)| Shot {
-        pattern: format!("patterns/{i:04}.png"),
+        pattern: format!("patterns/{:04}.png", first(shot)),
         photo: format!("photos/{i:04}.png"),
         exposure: shot.exposure,
     };

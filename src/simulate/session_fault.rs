@@ -234,6 +234,11 @@ impl SessionFault {
         }
     }
 
+    /// Whether the fault is in the correspondence that is declared.
+    pub fn is_of_correspondence(self) -> bool {
+        self.kind == Kind::Mirror
+    }
+
     /// Changes what is declared.
     pub fn change_manifest(self, manifest: &mut Manifest) {
         match self.kind {
@@ -243,7 +248,9 @@ impl SessionFault {
                     correspondence.affine[0] = [-a, -b, f64::from(manifest.light.width) - c];
                 }
             }
-            Kind::Gamma => manifest.light.gamma = Some(self.size),
+            Kind::Gamma => {
+                (manifest.light.gamma, manifest.light.response) = (Some(self.size), None);
+            }
             _ => {}
         }
     }
@@ -280,7 +287,11 @@ impl FromStr for SessionFault {
             (None, default) => default.unwrap_or(0.0),
             (Some(_), None) => return Err(format!("{name} has no size; give {name} alone")),
             (Some(size), Some(_)) => match size.parse::<f64>() {
-                Ok(size) if (0.0..=16.0).contains(&size) => size,
+                Ok(size) if kind == Kind::Gamma && (0.1..=10.0).contains(&size) => size,
+                Ok(size) if kind != Kind::Gamma && (0.0..=16.0).contains(&size) => size,
+                _ if kind == Kind::Gamma => {
+                    return Err("the size of gamma must be a number from 0.1 to 10".to_owned());
+                }
                 _ => return Err(format!("the size of {name} must be a number from 0 to 16")),
             },
         };

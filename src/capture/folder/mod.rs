@@ -280,7 +280,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             exposure,
             codes: file.open_rgb16()?,
             next_row: 0,
-            statistics: CodeStatistics::default(),
+            statistics: CodeStatistics::of_photograph(),
         })
     }
 }

@@ -119,13 +119,18 @@ impl RecoverJob<'_> {
         };
         warnings.add(messages::photographs(self.folder, self.shots, recovery));
         let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !self.args.force);
-        match (cause, unusable) {
-            (Some(cause), Some(_)) => bail!("{cause}; --force writes the file nevertheless"),
-            (Some(cause), None) => warnings.add([messages::capture_warning(cause)]),
-            (None, Some(snr)) => bail!(UnusableError(snr)),
-            (None, None) => {}
+        if let Some(cause) = cause
+            .clone()
+            .filter(|_| unusable.is_none() || self.args.strict)
+        {
+            warnings.add([messages::capture_warning(cause)]);
         }
         warnings.check(self.args.strict)?;
+        match (cause, unusable) {
+            (Some(cause), Some(_)) => bail!("{cause}; --force writes the file nevertheless"),
+            (None, Some(snr)) => bail!(UnusableError(snr)),
+            (_, None) => {}
+        }
         let (method, window) = (self.args.method(), recovery.geometry().window);
         let rank = recovery.basis().map(Basis::rank);
         let encoders = self.plan.tiles_encoded_at_once(window, rank.unwrap_or(0));

@@ -104,7 +104,7 @@ pub fn saturation(saturated: usize, measurements: &Measurements) -> Option<Warni
         return None;
     }
     let percent = saturated_percent(saturated, measurements);
-    eprintln!("note: {saturated} saturated samples ({percent:.1} %) are left out");
+    eprintln!("note: {saturated} saturated samples ({percent:.1} %) are not used");
     has_implausible_saturation(saturated, measurements).then(|| Warning {
         code: "saturation",
         message: "that is a large share; check \"camera.white\" in capture.json, or photograph with less \
