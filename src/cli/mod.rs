@@ -4,6 +4,7 @@
 //! [`advice`] adds the remedy.
 
 mod advice;
+mod capture_writer;
 mod evaluate;
 mod inspect;
 mod ltm_file;

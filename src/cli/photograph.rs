@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use image::{ExtendedColorType, ImageEncoder};
+use image::ExtendedColorType;
 use rayon::prelude::*;
 
+use super::capture_writer::{MAX_ELECTRONS, gray_code_shot, write_png};
 use super::{output_folder, progress};
 use crate::capture::{
-    CaptureFolder, GrayCodeShot, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, Pattern, Shot,
+    CaptureFolder, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, Pattern, Shot,
 };
 use crate::simulate::{Camera, GrayCodePattern, PatternImage, RandomStreamId, SessionFault};
 use crate::transport::{CHANNELS, Extent};
@@ -23,18 +24,23 @@ pub struct PhotographArgs {
     /// Capture folder to write; must be new or empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Fault, with its size if it is not this one; can be given several times: underexposed=0.5, object, pattern, blend=0.5,
-    /// swap, slip, jitter=0.02, drift=0.05, exposure=0.05, room=0.01, growing-room=0.02, tremble=0.2, move=0.5, mirror,
-    /// gamma=1.8, dimming=0.15, srgb, clip=0.4, defects=0.001, 8-bit
-    #[arg(long = "fault", value_name = "NAME[=SIZE]")]
+    #[arg(long = "fault", value_name = "NAME[=SIZE]", help = fault_help())]
     faults: Vec<SessionFault>,
     /// Seed of noise and faults
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Electrons at full scale; fewer mean more noise
     #[arg(long, value_name = "N", default_value_t = 40_000,
-          value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
+          value_parser = clap::value_parser!(u64).range(1..=MAX_ELECTRONS))]
     electrons: u64,
+}
+
+fn fault_help() -> String {
+    let faults: Vec<String> = SessionFault::all().map(|fault| fault.to_string()).collect();
+    format!(
+        "Fault, with its size if it is not this one; can be given several times: {}",
+        faults.join(", ")
+    )
 }
 
 pub fn run(args: &PhotographArgs) -> Result<()> {
@@ -100,20 +106,19 @@ fn photograph(
     let patterns = patterns.collect::<Result<Vec<Pattern>, _>>()?;
     let random = || RandomStreamId::Fault.start(args.seed);
     let mut pictures: Vec<Vec<Vec<f32>>> = Vec::new();
+    let uniform = |emission: f32| vec![emission; light.area()];
+    let mut others = vec![uniform(0.0), uniform(1.0)];
+    others.extend(gray_code.iter().map(|code| match code.codes(light) {
+        PatternImage::Grey(codes) => codes.iter().map(|&code| f32::from(code) / 255.0).collect(),
+        PatternImage::Rgb(_) => Vec::new(),
+    }));
     let bar = progress::bar("photographing", CHANNELS);
     for c in 0..CHANNELS {
         let mut emissions: Vec<Vec<f32>> = patterns
             .iter()
             .map(|pattern| pattern.plane(c).to_vec())
             .collect();
-        let uniform = |emission: f32| vec![emission; light.area()];
-        let mut others = vec![uniform(0.0), uniform(1.0)];
-        others.extend(gray_code.iter().map(|code| match code.codes(light) {
-            PatternImage::Grey(codes) => {
-                codes.iter().map(|&code| f32::from(code) / 255.0).collect()
-            }
-            PatternImage::Rgb(_) => Vec::new(),
-        }));
+        let mut others = others.clone();
         // Every channel's faults are the same.
         let mut random = random();
         for fault in &args.faults {
@@ -141,18 +146,8 @@ fn photograph(
         .map(|i| format!("photos/{i:04}.png"))
         .collect();
     names.extend(["photos/dark.png", "photos/flood.png"].map(str::to_owned));
-    manifest.graycode.clear();
-    for code in &gray_code {
-        let sign = if code.inverted { 'n' } else { 'p' };
-        let photo = format!("graycode/{}{}{sign}.png", code.axis, code.bit);
-        names.push(photo.clone());
-        manifest.graycode.push(GrayCodeShot {
-            photo,
-            axis: code.axis,
-            bit: code.bit,
-            inverted: code.inverted,
-        });
-    }
+    manifest.graycode = gray_code.iter().copied().map(gray_code_shot).collect();
+    names.extend(manifest.graycode.iter().map(|shot| shot.photo.clone()));
     pictures.append(&mut others);
     let sensor = Camera {
         electrons: args.electrons as f64,
@@ -247,19 +242,13 @@ impl Session {
             }
         }
         self.photographs.par_iter().try_for_each(|(name, codes)| {
-            let path = root.join(name);
-            let write = || -> Result<()> {
-                let file = std::io::BufWriter::new(std::fs::File::create(&path)?);
-                let Extent { width, height } = self.camera;
-                image::codecs::png::PngEncoder::new(file).write_image(
-                    bytemuck::cast_slice(codes),
-                    width,
-                    height,
-                    ExtendedColorType::Rgb16,
-                )?;
-                Ok(())
-            };
-            write().with_context(|| path.display().to_string())
+            let bytes = bytemuck::cast_slice(codes);
+            write_png(
+                &root.join(name),
+                self.camera,
+                bytes,
+                ExtendedColorType::Rgb16,
+            )
         })
     }
 }

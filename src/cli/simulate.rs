@@ -1,22 +1,22 @@
 //! `ltm-export simulate`: photographs a built-in scene into a capture folder with its known transport.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 use half::f16;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+use image::ExtendedColorType;
 use npyz::{NpyWriter, WriterBuilder};
 use rayon::prelude::*;
 
+use super::capture_writer::{MAX_ELECTRONS, gray_code_shot, write_png};
 use super::report::format_bytes;
 use super::{output_folder, progress};
 use crate::capture::{
-    GrayCodeShot, MANIFEST_NAME, Manifest, ManifestCamera, ManifestLight, RELIT_FULL_SCALE, Shot,
+    MANIFEST_NAME, Manifest, ManifestCamera, ManifestLight, RELIT_FULL_SCALE, Shot,
 };
 use crate::simulate::{
     Camera, EmissionMatrix, GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage,
@@ -33,8 +33,6 @@ const MAX_PATTERNS: i64 = 10_000;
 /// All pictures are in memory, as each strip of transport is computed once and exposes all of them.
 const MAX_PICTURE_BYTES: usize = 3 << 30;
 const TAU_ERROR: &str = "truth/tau.npy cannot be written";
-/// With more electrons photon noise is far below a code, and Poisson sampling loses precision.
-const MAX_ELECTRONS: u64 = 1_000_000_000_000;
 
 /// Photograph a built-in scene with known transport into a capture folder
 #[derive(Debug, Args)]
@@ -154,15 +152,9 @@ impl<'a> SimulationPlan<'a> {
             plan.photograph(codes, format!("photos/{name}.png"), None);
         }
         for code in GrayCodePattern::all(args.light) {
-            let sign = if code.inverted { 'n' } else { 'p' };
-            let photo = format!("graycode/{}{}{sign}.png", code.axis, code.bit);
-            plan.photograph(code.codes(args.light), photo.clone(), None);
-            plan.manifest.graycode.push(GrayCodeShot {
-                photo,
-                axis: code.axis,
-                bit: code.bit,
-                inverted: code.inverted,
-            });
+            let shot = gray_code_shot(code);
+            plan.photograph(code.codes(args.light), shot.photo.clone(), None);
+            plan.manifest.graycode.push(shot);
         }
         let ensemble = args.ensemble.unwrap_or(args.scene.ensemble());
         for i in 0..args.patterns {
@@ -304,15 +296,4 @@ fn create_npy<T: npyz::AutoSerialize>(
         options.writer(file).begin_nd()
     };
     create().with_context(|| path.display().to_string())
-}
-
-fn write_png(path: &Path, extent: Extent, bytes: &[u8], color: ExtendedColorType) -> Result<()> {
-    let write = || -> Result<()> {
-        let mut file = BufWriter::new(File::create(path)?);
-        // Photographs are mostly noise, which no level compresses well.
-        PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Sub)
-            .write_image(bytes, extent.width, extent.height, color)?;
-        Ok(file.flush()?)
-    };
-    write().with_context(|| path.display().to_string())
 }

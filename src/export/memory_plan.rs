@@ -93,7 +93,7 @@ impl MemoryPlan {
         };
         let all = plan.row_bytes * u64::from(camera.height);
         // Beside the loaded rows: a tile, or while the recovery is prepared, these rows resampled.
-        let resampled = method.resampled_bytes(shots) as u64;
+        let resampled = Method::resampled_bytes(shots) as u64;
         let beside = |rows: u64| tile.max(rows.min(resampled));
         let min_rows = (TILE_SIDE + 2 * method.max_halo()).min(camera.height);
         let min_bytes = plan.row_bytes * u64::from(min_rows);

@@ -77,20 +77,6 @@ impl LightPlaneSymmetry {
         all.filter(move |symmetry| !symmetry.is_transposed || light.width == light.height)
     }
 
-    fn apply(self, light: Extent, at: LightPosition) -> LightPosition {
-        let (mut u, mut v) = (at.u, at.v);
-        if self.is_transposed {
-            (u, v) = (v, u);
-        }
-        if self.is_mirrored {
-            u = f64::from(light.width) - u;
-        }
-        if self.is_flipped {
-            v = f64::from(light.height) - v;
-        }
-        LightPosition { u, v }
-    }
-
     /// The correspondence after the change.
     pub fn of_correspondence(
         self,
@@ -139,7 +125,7 @@ pub fn diagnose(
         executor,
     };
     let photographs = search.relative_measurements();
-    let responses = search.relative_responses(|at| at);
+    let responses = search.relative_responses(&measurements.correspondence);
     executor.check_cancelled()?;
     if let Some(fault) = search.slipped(&photographs, &responses) {
         return Ok(Some(fault));
@@ -178,13 +164,13 @@ impl<E: Executor> Search<'_, E> {
         })
     }
 
-    /// `[L][pixel]`: the light of each pattern around a pixel's correspondence relative to the mean over the patterns, less
-    /// 1, after `change` of positions on the light plane.
-    fn relative_responses(&self, change: impl Fn(LightPosition) -> LightPosition) -> Vec<Vec<f64>> {
+    /// `[L][pixel]`: the light of each pattern around a pixel's place by `correspondence`, relative to the mean over the
+    /// patterns, less 1.
+    fn relative_responses(&self, correspondence: &Correspondence) -> Vec<Vec<f64>> {
         let light = self.measurements.light;
         let mut blobs: Vec<Vec<(usize, f64)>> = Vec::with_capacity(self.pixels.len());
         for pixel in &self.pixels {
-            let LightPosition { u, v } = change(self.measurements.correspondence.at(*pixel));
+            let LightPosition { u, v } = correspondence.at(*pixel);
             let mut blob = Vec::new();
             let range = -BLOB_RADIUS..=BLOB_RADIUS;
             for (dv, du) in range
@@ -271,8 +257,8 @@ impl<E: Executor> Search<'_, E> {
         let light = self.measurements.light;
         let symmetries: Vec<LightPlaneSymmetry> = LightPlaneSymmetry::all(light).collect();
         let correlations = self.executor.map(symmetries.len(), |i| {
-            let change = |at| symmetries[i].apply(light, at);
-            (typical(&self.relative_responses(change)), symmetries[i])
+            let changed = symmetries[i].of_correspondence(light, self.measurements.correspondence);
+            (typical(&self.relative_responses(&changed)), symmetries[i])
         });
         let best = correlations
             .into_iter()

@@ -60,7 +60,7 @@ impl Method {
     }
 
     /// Upper bound on the memory that resampled samples of so many photographs take while a recovery is prepared, in bytes.
-    pub fn resampled_bytes(self, photographs: usize) -> usize {
+    pub fn resampled_bytes(photographs: usize) -> usize {
         photometry::max_prepared_bytes(photographs) + photometry::max_tile_bytes(photographs, 0)
     }
 

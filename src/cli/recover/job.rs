@@ -119,17 +119,16 @@ impl RecoverJob<'_> {
         };
         warnings.add(messages::photographs(self.folder, self.shots, recovery));
         let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !self.args.force);
-        if let Some(cause) = cause
-            .clone()
-            .filter(|_| unusable.is_none() || self.args.strict)
-        {
-            warnings.add([messages::capture_warning(cause)]);
+        match (cause, unusable) {
+            (Some(cause), Some(_)) if !self.args.strict => {
+                bail!("{cause}; --force writes the file nevertheless")
+            }
+            (Some(cause), _) => warnings.add([messages::capture_warning(cause)]),
+            (None, _) => {}
         }
         warnings.check(self.args.strict)?;
-        match (cause, unusable) {
-            (Some(cause), Some(_)) => bail!("{cause}; --force writes the file nevertheless"),
-            (None, Some(snr)) => bail!(UnusableError(snr)),
-            (_, None) => {}
+        if let Some(snr) = unusable {
+            bail!(UnusableError(snr));
         }
         let (method, window) = (self.args.method(), recovery.geometry().window);
         let rank = recovery.basis().map(Basis::rank);
