@@ -11,8 +11,8 @@ use super::mean_function;
 use super::method::Method;
 use super::pattern_check;
 use super::photometry::{
-    self, CalibratedMeasurements, PhotographCorrection, PhotographFault, ResampledPhotographs,
-    ResamplingInput,
+    self, CalibratedMeasurements, PhotographCorrection, PhotographFault, Photometry,
+    ResampledPhotographs,
 };
 use super::pixelwise::PixelwiseRecovery;
 use super::preparation_input::{self, RecoveryPreparationInput};
@@ -40,13 +40,8 @@ pub struct RecoverySettings {
 pub struct PreparedRecovery {
     geometry: Geometry,
     split: HoldoutSplit,
-    corrections: Vec<PhotographCorrection>,
-    /// What photographs are resampled with, `[slot]`.
-    mean_function: Vec<f64>,
+    photometry: Photometry,
     solver: TileSolver,
-    /// The photographs that are left out. Not needed to recover tiles elsewhere.
-    #[serde(skip)]
-    faults: Vec<(usize, PhotographFault)>,
     /// Not needed to recover tiles elsewhere.
     #[serde(skip)]
     holdout_validation: Option<HoldoutValidation>,
@@ -86,17 +81,10 @@ impl PreparedRecovery {
         let photometry = photometry::estimate(&preparation, &mean).await?;
         let is_left_out = |l: usize| photometry.faults.iter().any(|fault| fault.0 == l);
         let split = HoldoutSplit::without(&measurements.patterns, is_left_out);
-        let input = ResamplingInput {
-            measurements,
-            corrections: &photometry.corrections,
-            geometry: &geometry,
-            mean_function: &photometry.mean_function,
-            used: &split.all,
-        };
+        let input = photometry.resampling_input(measurements, &geometry, &split.all);
         let resampled = ResampledPhotographs::of_picture(input);
-        let calibrated = CalibratedMeasurements::new(measurements, &photometry.corrections);
         let preparation = RecoveryPreparationInput {
-            measurements: &calibrated.with_resampled(resampled.as_ref()),
+            measurements: &input.calibrated(resampled.as_ref()),
             split: &split,
             ..preparation
         };
@@ -118,10 +106,8 @@ impl PreparedRecovery {
         let mut recovery = Self {
             geometry,
             split: split.clone(),
-            corrections: photometry.corrections.clone(),
-            mean_function: photometry.mean_function.clone(),
+            photometry: photometry.clone(),
             solver,
-            faults: photometry.faults.clone(),
             holdout_validation: None,
         };
         let measurements = preparation.measurements;
@@ -159,7 +145,7 @@ impl PreparedRecovery {
 
     /// Corrections of the photographs, one for each; none at all if no photograph needs one.
     pub fn corrections(&self) -> &[PhotographCorrection] {
-        &self.corrections
+        &self.photometry.corrections
     }
 
     /// Root mean square of the shifts between the photographs that are used, in camera pixels; `None` if none is worth a
@@ -169,7 +155,7 @@ impl PreparedRecovery {
             .split
             .all
             .iter()
-            .filter_map(|&l| self.corrections.get(l));
+            .filter_map(|&l| self.photometry.corrections.get(l));
         let squares = shifts.map(|correction| {
             let [x, y] = correction.shift;
             x * x + y * y
@@ -180,7 +166,7 @@ impl PreparedRecovery {
 
     /// The photographs that are left out, by their indices in the measurements, with the fault that each looks like.
     pub fn faults(&self) -> &[(usize, PhotographFault)] {
-        &self.faults
+        &self.photometry.faults
     }
 
     /// The validation on held-out patterns; `None` if there are too few patterns to hold any out.
@@ -190,7 +176,7 @@ impl PreparedRecovery {
 
     /// Distance from a tile, in camera pixels, of the measurements that the tile depends on.
     pub fn halo(&self) -> u32 {
-        let has_shifts = self.corrections.iter().any(|c| c.is_shifted());
+        let has_shifts = self.photometry.corrections.iter().any(|c| c.is_shifted());
         self.solver_halo() + if has_shifts { photometry::HALO } else { 0 }
     }
 
@@ -204,17 +190,11 @@ impl PreparedRecovery {
     /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other rows of the same
     /// capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> FloatTile {
-        let input = ResamplingInput {
-            measurements,
-            corrections: &self.corrections,
-            geometry: &self.geometry,
-            mean_function: &self.mean_function,
-            used: &self.split.all,
-        };
+        let used = &self.split.all;
+        let input = (self.photometry).resampling_input(measurements, &self.geometry, used);
         let region = sampling::with_margin(measurements, rect, self.solver_halo());
         let resampled = ResampledPhotographs::of_region(input, region);
-        let calibrated = CalibratedMeasurements::new(measurements, &self.corrections);
-        let measurements = &calibrated.with_resampled(resampled.as_ref());
+        let measurements = &input.calibrated(resampled.as_ref());
         match &self.solver {
             TileSolver::Learned(learned) => learned.tile(measurements, &self.split, rect),
             TileSolver::Pixelwise(solver) => {

@@ -134,10 +134,7 @@ pub(super) fn usable_samples(
     c: usize,
 ) -> (Vec<usize>, Vec<f64>) {
     let usable = unsaturated(measurements, pattern_indices, &[(0, pixel)], c..c + 1);
-    let sample = |&l: &usize| match measurements.sample(l, pixel, c) {
-        y if y.is_finite() => y,
-        _ => measurements.white(l),
-    };
+    let sample = |&l: &usize| measurements.sample_or_white(l, pixel, c);
     let y = usable.iter().map(sample).collect();
     (usable, y)
 }

@@ -99,9 +99,17 @@ impl<'a> CalibratedMeasurements<'a> {
     }
 
     /// The least that a saturated sample can be.
-    pub fn white(&self, l: usize) -> f64 {
+    fn white(&self, l: usize) -> f64 {
         let white = f64::from(self.measurements.full_scale[l]);
         self.correction(l).apply(white)
+    }
+
+    /// The same; white, the least that it can be, if saturated.
+    pub fn sample_or_white(&self, l: usize, pixel: CameraPixel, c: usize) -> f64 {
+        match self.sample(l, pixel, c) {
+            y if y.is_finite() => y,
+            _ => self.white(l),
+        }
     }
 
     /// Variance of a sample `y` of channel `c` under pattern `l`.

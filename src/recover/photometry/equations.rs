@@ -9,7 +9,6 @@
 //! fixed, as brightness and functions absorb them. The leak is the light from outside the window relative to brightness, nearly constant, the same for all pixels: it must
 //! not pass for stray light, which does not depend on brightness.
 
-use super::CalibratedMeasurements;
 use super::resampling::{ResampledPhotographs, ResamplingInput};
 use super::window_covariance::{ScaledPixel, WindowCovariance, WindowModel, gradients};
 use crate::capture::Measurements;
@@ -82,8 +81,7 @@ pub(super) async fn fit(
                 Some(_) => None,
                 None => ResampledPhotographs::of_region(input, region),
             };
-            let measurements = CalibratedMeasurements::new(input.measurements, input.corrections)
-                .with_resampled(picture.as_ref().or(resampled.as_ref()));
+            let measurements = input.calibrated(picture.as_ref().or(resampled.as_ref()));
             let preparation = &preparation.with(&measurements);
             for_largest_window(preparation, *square, |origin, pixels| {
                 vectorise(

@@ -5,10 +5,7 @@
 
 use super::equations::{self, CorrectionStep, MAX_PHOTOGRAPHS};
 use super::resampling::MAX_SHIFT;
-use super::{
-    CalibratedMeasurements, PhotographCorrection, PhotographFault, Photometry,
-    ResampledPhotographs, ResamplingInput, faults,
-};
+use super::{PhotographCorrection, PhotographFault, Photometry, ResampledPhotographs, faults};
 use crate::job_executor::{Cancelled, Executor};
 use crate::linalg::{self, median};
 use crate::recover::mean_function;
@@ -75,9 +72,12 @@ pub(in crate::recover) async fn estimate(
     if squares.len() < MIN_SQUARES || !(MIN_PHOTOGRAPHS..=MAX_PHOTOGRAPHS).contains(&count) {
         return Ok(Photometry::default());
     }
-    let mean_function =
-        mean_function::smooth(mean_function, preparation.geometry.window.side() as usize);
-    let mut corrections = vec![PhotographCorrection::IDENTITY; count];
+    let side = preparation.geometry.window.side() as usize;
+    let mut photometry = Photometry {
+        mean_function: mean_function::smooth(mean_function, side),
+        corrections: vec![PhotographCorrection::IDENTITY; count],
+        faults: Vec::new(),
+    };
     let mut used: Vec<usize> = (0..count).collect();
     let mut outliers: Vec<usize> = Vec::new();
     let mut moved: Vec<(usize, PhotographFault)> = Vec::new();
@@ -87,30 +87,26 @@ pub(in crate::recover) async fn estimate(
     let (mut steps, mut shift_steps) = (0, 0);
     let last = loop {
         preparation.executor.check_cancelled()?;
-        let input = ResamplingInput {
-            measurements,
-            corrections: &corrections,
-            geometry: &preparation.geometry,
-            mean_function: &mean_function,
-            used: &used,
-        };
+        let input = photometry.resampling_input(measurements, &preparation.geometry, &used);
         let step = equations::fit(preparation, input, &squares).await?;
         let Some(step) = step else {
             return Ok(Photometry::default());
         };
         if steps < MAX_STEPS && step.is_significant() {
             steps += 1;
-            step.apply(&used, &mut corrections);
+            step.apply(&used, &mut photometry.corrections);
             continue;
         }
         if readmission_steps > 0 {
             readmission_steps -= 1;
-            step.apply_shifts(&used, &mut corrections, |l| readmitted.contains(&l));
+            step.apply_shifts(&used, &mut photometry.corrections, |l| {
+                readmitted.contains(&l)
+            });
             continue;
         }
         let found = step.outliers();
         if found.is_empty() && shift_steps < MAX_SHIFT_STEPS && step.has_shifts() {
-            step.apply_shifts(&used, &mut corrections, |_| true);
+            step.apply_shifts(&used, &mut photometry.corrections, |_| true);
             (steps, shift_steps) = (0, shift_steps + 1);
         } else if !found.is_empty() {
             if outliers.len() + found.len() > max_outliers {
@@ -127,14 +123,14 @@ pub(in crate::recover) async fn estimate(
                 .collect();
             readmission_steps = MAX_READMISSION_STEPS;
         } else {
-            let left_out = moved_photographs(&used, &corrections);
+            let left_out = moved_photographs(&used, &photometry.corrections);
             let all_moved = moved.len() + left_out.len();
             if left_out.is_empty() || all_moved as f64 > MAX_MOVED_SHARE * count as f64 {
                 break step;
             }
             used.retain(|l| !left_out.contains(l));
             let fault = |l: usize| PhotographFault::Moved {
-                shift: corrections[l].shift,
+                shift: photometry.corrections[l].shift,
             };
             moved.extend(left_out.into_iter().map(|l| (l, fault(l))));
             (steps, shift_steps) = (0, 0);
@@ -149,36 +145,33 @@ pub(in crate::recover) async fn estimate(
     }
     for l in 0..count {
         if !used.contains(&l) {
-            corrections[l] = PhotographCorrection::IDENTITY;
+            photometry.corrections[l] = PhotographCorrection::IDENTITY;
         }
     }
-    last.keep_significant(&used, &mut corrections);
-    if corrections
+    last.keep_significant(&used, &mut photometry.corrections);
+    if photometry
+        .corrections
         .iter()
         .all(|c| *c == PhotographCorrection::IDENTITY)
     {
-        corrections.clear();
+        photometry.corrections.clear();
     }
-    let input = ResamplingInput {
-        measurements,
-        corrections: &corrections,
-        geometry: &preparation.geometry,
-        mean_function: &mean_function,
-        used: &used,
-    };
+    let input = photometry.resampling_input(measurements, &preparation.geometry, &used);
     let resampled = ResampledPhotographs::of_picture(input);
-    let calibrated = CalibratedMeasurements::new(measurements, &corrections);
-    let calibrated = calibrated.with_resampled(resampled.as_ref());
+    let calibrated = input.calibrated(resampled.as_ref());
     let preparation = preparation.with(&calibrated);
-    let faults = faults::classify(&preparation, &mean_function, &squares, &used, &outliers);
+    let faults = faults::classify(
+        &preparation,
+        input.mean_function,
+        &squares,
+        &used,
+        &outliers,
+    );
     let mut faults = faults.await?;
     faults.extend(moved);
     let order = linalg::ascending_order(faults.iter().map(|fault| fault.0 as f64));
-    Ok(Photometry {
-        mean_function,
-        faults: order.into_iter().map(|i| faults[i]).collect(),
-        corrections,
-    })
+    photometry.faults = order.into_iter().map(|i| faults[i]).collect();
+    Ok(photometry)
 }
 
 impl CorrectionStep {

@@ -11,6 +11,11 @@
 //! section 5.4.2). A photograph that is predicted far worse than the others is left out, with the [fault](faults) that it
 //! most looks like.
 
+use serde::{Deserialize, Serialize};
+
+use crate::capture::Measurements;
+use crate::transport::Geometry;
+
 mod calibrated_measurements;
 mod equations;
 mod estimate;
@@ -30,11 +35,13 @@ pub(super) use resampling::{
 };
 
 /// Corrections of the photographs, and those that are left out.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Photometry {
     /// One for each photograph; none at all if no photograph needs one.
     pub corrections: Vec<PhotographCorrection>,
-    /// The photographs that are left out, by their indices in the measurements, with the fault that each looks like.
+    /// The photographs that are left out, by their indices in the measurements, with the fault that each looks like. Not
+    /// needed to recover tiles elsewhere.
+    #[serde(skip)]
     pub faults: Vec<(usize, PhotographFault)>,
     /// The mean function that shifted photographs are [resampled](resampling) with, `[slot]`.
     pub mean_function: Vec<f64>,
@@ -44,5 +51,21 @@ impl Photometry {
     /// Whether photographs are corrected or left out.
     pub fn has_changes(&self) -> bool {
         !self.corrections.is_empty() || !self.faults.is_empty()
+    }
+
+    /// What the photographs `used` are resampled from.
+    pub(super) fn resampling_input<'a>(
+        &'a self,
+        measurements: &'a Measurements,
+        geometry: &'a Geometry,
+        used: &'a [usize],
+    ) -> ResamplingInput<'a> {
+        ResamplingInput {
+            measurements,
+            corrections: &self.corrections,
+            geometry,
+            mean_function: &self.mean_function,
+            used,
+        }
     }
 }

@@ -151,26 +151,26 @@ fn blocks(rect: TileRect, block: Extent) -> (u32, u32) {
     (columns, rect.extent.height.div_ceil(block.height))
 }
 
-impl ResamplingInput<'_> {
+impl<'a> ResamplingInput<'a> {
+    /// The measurements as they are corrected, and `resampled` if that is something.
+    pub fn calibrated(
+        self,
+        resampled: Option<&'a ResampledPhotographs<'a>>,
+    ) -> CalibratedMeasurements<'a> {
+        CalibratedMeasurements::new(self.measurements, self.corrections).with_resampled(resampled)
+    }
+
     /// The corrected samples of a region, `[pixel, L, channel]`; NaN where saturated.
     fn resample(&self, rect: TileRect) -> Vec<f32> {
-        let measurements = CalibratedMeasurements::new(self.measurements, self.corrections);
+        let measurements = self.calibrated(None);
         let with_margin = |margin: u32| sampling::with_margin(self.measurements, rect, margin);
-        // A saturated sample is white, the least that it can be.
-        let unsaturated = |l: usize, pixel: CameraPixel, c: usize| {
-            let y = measurements.sample(l, pixel, c);
-            if y.is_finite() {
-                y
-            } else {
-                measurements.white(l)
-            }
-        };
         let region = with_margin(HALO);
         let mut measured = Vec::with_capacity(self.used.len());
         for &l in self.used {
             let mut photograph = Vec::with_capacity(region.extent.area() * CHANNELS);
             for pixel in region.pixels() {
-                (0..CHANNELS).for_each(|c| photograph.push(unsaturated(l, pixel, c)));
+                (0..CHANNELS)
+                    .for_each(|c| photograph.push(measurements.sample_or_white(l, pixel, c)));
             }
             measured.push(photograph);
         }

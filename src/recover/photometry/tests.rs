@@ -131,13 +131,7 @@ fn a_camera_that_trembles_is_followed() {
         }
     }
     let used: Vec<usize> = (0..PATTERNS).collect();
-    let input = ResamplingInput {
-        measurements: &capture.measurements,
-        corrections: &photometry.corrections,
-        geometry: &capture.geometry,
-        mean_function: &photometry.mean_function,
-        used: &used,
-    };
+    let input = photometry.resampling_input(&capture.measurements, &capture.geometry, &used);
     let rect = TileRect {
         x: 8,
         y: 8,
