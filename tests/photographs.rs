@@ -273,7 +273,7 @@ fn a_mirrored_correspondence_is_refused_with_the_right_one() {
 }
 
 #[test]
-fn a_move_by_pixels_is_refused_with_its_place() {
+fn after_a_move_by_pixels_only_the_photographs_before_are_used() {
     let capture = Capture::new();
     for l in 30..60 {
         let before = capture.read(l);
@@ -282,13 +282,18 @@ fn a_move_by_pixels_is_refused_with_its_place() {
         });
         moved.save(capture.photo(l)).unwrap();
     }
-    let error = capture.error();
-    assert!(
-        error.contains(
-            "moved before shots[30] (photos/0030.png), by about 3 pixels to the right and 1 pixel down: remove"
-        ),
-        "{error}"
-    );
+    let (report, errors) = capture.report();
+    let words = "moved before shots[30] (photos/0030.png), by about 3 pixels to the right and 1 pixel down: the 27 photographs \
+                 from then on are left out";
+    assert!(errors.contains(words), "{errors}");
+    assert_eq!(report["warnings"][0]["code"], "photograph-moved");
+    assert_eq!(report["photographs"], 27);
+    let table = report["photograph_table"].as_array().unwrap();
+    assert_eq!(table.len(), 54);
+    for photo in table {
+        let is_late = photo["shot"].as_u64().unwrap() >= 30;
+        assert_eq!(photo["verdict"] == "photograph-moved", is_late, "{photo}");
+    }
 }
 
 #[test]
@@ -362,11 +367,16 @@ fn codes_that_are_declared_wrong_are_warned_of() {
     for l in 0..60 {
         clipped.change(l, |_, y| y.min(0.25));
     }
-    let clipped = codes(&clipped);
+    let (report, errors) = clipped.report();
+    assert_eq!(report["warnings"][0]["code"], "saturation-undeclared");
+    let field = &report["estimated_fields"][0];
+    let code = (BLACK + (WHITE - BLACK) * 0.25).round();
+    assert_eq!(field["estimated"], serde_json::json!([code, code, code]));
     assert!(
-        clipped.contains(&"saturation-undeclared".to_owned()),
-        "{clipped:?}"
+        report["saturated_samples"].as_u64().unwrap() > 1000,
+        "{errors}"
     );
+    assert_eq!(field["is_used"], true);
     let coarse = Capture::new();
     for l in 0..60 {
         let mut photo = coarse.read(l);
@@ -384,6 +394,62 @@ fn codes_that_are_declared_wrong_are_warned_of() {
         !coarse.contains(&"saturation-undeclared".to_owned()),
         "{coarse:?}"
     );
+}
+
+#[test]
+fn a_tone_curve_is_told_and_undone_if_estimates_are_trusted() {
+    let clean = Capture::new().report().0;
+    let capture = Capture::new();
+    let curve = |_, y: f64| match y {
+        y if y <= 0.003_130_8 => 12.92 * y,
+        y => 1.055 * y.powf(1.0 / 2.4) - 0.055,
+    };
+    for l in 0..60 {
+        capture.change(l, curve);
+    }
+    let output = capture.recover(&["--force"]);
+    let errors = String::from_utf8(output.stderr).unwrap();
+    let text = r#""camera": {"response": "srgb"}"#;
+    assert!(errors.contains(text), "{errors}");
+    let trusting = capture.recover(&["--trust", "estimated", "--strict"]);
+    let errors = String::from_utf8(trusting.stderr).unwrap();
+    assert!(trusting.status.success(), "{errors}");
+    let report: Value = serde_json::from_slice(&trusting.stdout).unwrap();
+    let field = &report["estimated_fields"][0];
+    assert_eq!(field["field"], "camera.response");
+    assert_eq!(field["estimated"], "srgb");
+    let loss = number(&clean["expected_snr_db"]) - number(&report["expected_snr_db"]);
+    assert!(loss.abs() < 1.0, "{loss} dB");
+
+    // Declared, it is no doubt.
+    let path = capture.path.join("capture.json");
+    let mut manifest: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    manifest["camera"]["response"] = "srgb".into();
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    let (declared, _) = capture.report();
+    assert_eq!(declared["estimated_fields"], Value::Array(Vec::new()));
+    assert_eq!(declared["expected_snr_db"], report["expected_snr_db"]);
+}
+
+#[test]
+fn a_display_that_dims_bright_pictures_is_told() {
+    let capture = Capture::new();
+    // Of 15 % when all elements are lit; patterns have half of them lit.
+    let path = capture.path.join("photos/flood.png");
+    let mut flood = image::open(&path).unwrap().to_rgb16();
+    for sample in flood.iter_mut() {
+        *sample = (BLACK + 0.85 / 0.925 * (f64::from(*sample) - BLACK)).round() as u16;
+    }
+    flood.save(&path).unwrap();
+    let (report, errors) = capture.report();
+    assert_eq!(report["warnings"][0]["code"], "display-dims", "{errors}");
+    let dimming = number(&report["estimated_fields"][0]["estimated"]);
+    assert!((dimming - 0.15).abs() < 0.02, "{dimming}");
+    assert_eq!(report["estimated_fields"][0]["is_used"], false);
+    let trusting = capture.recover(&["--trust", "estimated", "--strict"]);
+    assert!(trusting.status.success());
+    let report: Value = serde_json::from_slice(&trusting.stdout).unwrap();
+    assert_eq!(report["estimated_fields"][0]["is_used"], true);
 }
 
 #[test]

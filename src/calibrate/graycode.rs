@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::affine_fit::{GrayCodePosition, fit_affine_row};
+use crate::linalg;
 use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
 
 /// Least contrast `|p − n| / (p + n)` of a clear bit. Scattering lowers the contrast; at the edge of a stripe it passes
@@ -15,6 +16,8 @@ use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
 const MIN_CONTRAST: f32 = 0.15;
 /// Least brightness `p + n` of a usable pixel, relative to the brightest.
 const MIN_RELATIVE_BRIGHTNESS: f32 = 0.05;
+/// Least brightness of a pixel whose contrast counts, relative to the brightest: noise raises the contrast of darker ones.
+const MIN_CONTRAST_BRIGHTNESS: f32 = 0.1;
 /// Least number of decoded pixels for a reliable fit.
 const MIN_DECODED_PIXELS: usize = 100;
 
@@ -44,6 +47,33 @@ pub struct BitPair {
     pub plain: Vec<[f32; CHANNELS]>,
     /// Under the inverted pattern.
     pub inverted: Vec<[f32; CHANNELS]>,
+}
+
+impl BitPair {
+    /// The contrast of plain and inverted pattern, `|p − n| / (p + n)`, that one in a hundred of the bright camera pixels
+    /// exceeds. It is 1 where a pixel sees elements of the same code only. `None` without bright pixels.
+    ///
+    /// If the display is sharp, the object alone lowers the contrast of its finest stripes.
+    pub fn best_contrast(&self) -> Option<f32> {
+        let sums = |photo: &[[f32; CHANNELS]]| -> Vec<f32> {
+            photo.iter().map(|sample| sample.iter().sum()).collect()
+        };
+        let pairs: Vec<(f32, f32)> = (sums(&self.plain).into_iter())
+            .zip(sums(&self.inverted))
+            .filter(|(p, n)| (p + n).is_finite())
+            .collect();
+        let brightest = pairs.iter().map(|(p, n)| p + n).fold(0.0, f32::max);
+        let bright = pairs
+            .iter()
+            .filter(|(p, n)| p + n > MIN_CONTRAST_BRIGHTNESS * brightest);
+        let mut contrasts: Vec<f64> = bright
+            .map(|(p, n)| f64::from((p - n).abs() / (p + n)))
+            .collect();
+        linalg::sort(&mut contrasts);
+        contrasts
+            .get(contrasts.len() * 99 / 100)
+            .map(|contrast| *contrast as f32)
+    }
 }
 
 /// Why no correspondence can be decoded.
@@ -217,6 +247,24 @@ mod tests {
             let apart = (found.u - truth.u).hypot(found.v - truth.v);
             assert!(apart < 0.1, "blur {blur}: {apart} elements off");
         }
+    }
+
+    #[test]
+    fn contrast_of_the_finest_stripes_is_that_of_the_sharpest_pixels() {
+        let camera = Extent::new(60, 40);
+        let affine = [[0.5, 0.0, 1.0], [0.0, 0.5, 1.0]];
+        let contrast = |blur| {
+            let photos = photograph(camera, affine, 5, blur);
+            photos.x.last().and_then(BitPair::best_contrast).unwrap()
+        };
+        assert!(contrast(0.0) > 0.99);
+        // A blur over three elements leaves a third of stripes of two.
+        assert!((contrast(1.5) - 0.33).abs() < 0.1, "{}", contrast(1.5));
+        let dark = BitPair {
+            plain: vec![[0.0; CHANNELS]; 4],
+            inverted: vec![[f32::NAN; CHANNELS]; 4],
+        };
+        assert_eq!(dark.best_contrast(), None);
     }
 
     #[test]

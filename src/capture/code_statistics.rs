@@ -1,8 +1,10 @@
 //! What the codes of photographs say of the camera: saturation, declared or not, and codes of 8 bits.
 
-/// Samples with the highest code that are so many a photograph, more than of a few stuck pixels, and so many times those
-/// with the next lower code, are saturated.
-const MIN_PILE: usize = 16;
+use crate::transport::CHANNELS;
+
+/// Samples of a channel with the highest code that are so many a photograph, more than of a few stuck pixels, and so many
+/// times those with the next lower code, are saturated.
+const MIN_PILE: usize = 6;
 const MIN_PILE_RATIO: usize = 8;
 /// 8-bit codes are scaled to 16 bits by one of these factors.
 const EIGHT_BIT_FACTORS: [u16; 2] = [257, 256];
@@ -10,11 +12,12 @@ const EIGHT_BIT_FACTORS: [u16; 2] = [257, 256];
 /// Counts of the codes of photographs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CodeStatistics {
-    /// Number of samples that are at white or above.
+    /// Number of samples that are saturated as the manifest says.
     pub saturated: usize,
     photographs: usize,
-    /// The highest code below white and the next lower one, each with the number of its samples.
-    highest: [(u16, usize); 2],
+    /// For each channel, the highest code that is not saturated and the next lower one, each with the number of its
+    /// samples.
+    highest: [[(u16, usize); 2]; CHANNELS],
     /// Whether all codes are multiples of each of [`EIGHT_BIT_FACTORS`].
     are_multiples: [bool; 2],
 }
@@ -24,7 +27,7 @@ impl Default for CodeStatistics {
         Self {
             photographs: 0,
             saturated: 0,
-            highest: [(0, 0); 2],
+            highest: [[(0, 0); 2]; CHANNELS],
             are_multiples: [true; 2],
         }
     }
@@ -39,14 +42,16 @@ impl CodeStatistics {
         }
     }
 
-    /// Counts a sample.
-    pub fn add(&mut self, code: u16, is_saturated: bool) {
-        for (are_multiples, factor) in self.are_multiples.iter_mut().zip(EIGHT_BIT_FACTORS) {
-            *are_multiples &= code.is_multiple_of(factor);
-        }
-        match is_saturated {
-            true => self.saturated += 1,
-            false => self.count(code, 1),
+    /// Counts a pixel.
+    pub fn add(&mut self, codes: [u16; CHANNELS], saturated: [bool; CHANNELS]) {
+        for c in 0..CHANNELS {
+            for (are_multiples, factor) in self.are_multiples.iter_mut().zip(EIGHT_BIT_FACTORS) {
+                *are_multiples &= codes[c].is_multiple_of(factor);
+            }
+            match saturated[c] {
+                true => self.saturated += 1,
+                false => count(&mut self.highest[c], codes[c], 1),
+            }
         }
     }
 
@@ -54,8 +59,10 @@ impl CodeStatistics {
     pub fn merge(mut self, other: Self) -> Self {
         self.photographs += other.photographs;
         self.saturated += other.saturated;
-        for (code, count) in other.highest {
-            self.count(code, count);
+        for (own, other) in self.highest.iter_mut().zip(other.highest) {
+            for (code, samples) in other {
+                count(own, code, samples);
+            }
         }
         for (own, other) in self.are_multiples.iter_mut().zip(other.are_multiples) {
             *own &= other;
@@ -63,29 +70,19 @@ impl CodeStatistics {
         self
     }
 
-    fn count(&mut self, code: u16, count: usize) {
-        let [first, second] = &mut self.highest;
-        if code == first.0 {
-            first.1 += count;
-        } else if code > first.0 {
-            (*first, *second) = ((code, count), *first);
-        } else if code == second.0 {
-            second.1 += count;
-        } else if code > second.0 {
-            *second = (code, count);
-        }
-    }
-
-    /// The code below white at which samples are saturated, if there is one: they pile up there.
-    pub fn undeclared_white(&self) -> Option<u16> {
-        let [(code, count), (_, next)] = self.highest;
-        let is_pile = count >= MIN_PILE * self.photographs && count >= MIN_PILE_RATIO * next.max(1);
-        (code > 0 && is_pile).then_some(code)
+    /// The code at which samples of each channel are saturated though this is not declared, if there is one: they pile up
+    /// there.
+    pub fn undeclared_saturation(&self) -> [Option<u16>; CHANNELS] {
+        self.highest.map(|[(code, samples), (_, next)]| {
+            let is_pile =
+                samples >= MIN_PILE * self.photographs && samples >= MIN_PILE_RATIO * next.max(1);
+            (code > 0 && is_pile).then_some(code)
+        })
     }
 
     /// Distance of the codes.
     pub fn step(&self) -> u16 {
-        if self.highest[1].0 == 0 {
+        if self.highest.iter().all(|highest| highest[1].0 == 0) {
             return 1; // all photographs are black, or have one code
         }
         let factors = self.are_multiples.into_iter().zip(EIGHT_BIT_FACTORS);
@@ -95,15 +92,28 @@ impl CodeStatistics {
     }
 }
 
+/// Counts samples with a code.
+fn count([first, second]: &mut [(u16, usize); 2], code: u16, samples: usize) {
+    if code == first.0 {
+        first.1 += samples;
+    } else if code > first.0 {
+        (*first, *second) = ((code, samples), *first);
+    } else if code == second.0 {
+        second.1 += samples;
+    } else if code > second.0 {
+        *second = (code, samples);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn statistics(codes: impl IntoIterator<Item = u16>, white: u16) -> CodeStatistics {
         let mut statistics = CodeStatistics::of_photograph();
-        codes
-            .into_iter()
-            .for_each(|code| statistics.add(code, code >= white));
+        for code in codes {
+            statistics.add([code; CHANNELS], [code >= white; CHANNELS]);
+        }
         statistics
     }
 
@@ -115,7 +125,10 @@ mod tests {
     #[test]
     fn samples_that_pile_up_below_white_are_found_in_all_photographs_together() {
         let clean = statistics(codes(9000), 60_000);
-        assert_eq!((clean.saturated, clean.undeclared_white()), (0, None));
+        assert_eq!(
+            (clean.saturated, clean.undeclared_saturation()),
+            (0, [None; CHANNELS])
+        );
         let clipped = |part: u32| {
             statistics(
                 codes(9000)
@@ -126,17 +139,25 @@ mod tests {
             )
         };
         let merged = clipped(0).merge(clipped(1)).merge(clipped(2));
-        assert_eq!(merged.undeclared_white(), Some(40_000));
+        assert_eq!(merged.undeclared_saturation(), [Some(40_000); CHANNELS]);
         // A stuck pixel in each of many photographs is none.
         let stuck = (0..40)
             .map(|_| statistics(codes(3000).map(|code| code / 2).chain([50_000; 3]), 60_000));
         let stuck = stuck.fold(CodeStatistics::default(), CodeStatistics::merge);
-        assert_eq!(stuck.undeclared_white(), None);
+        assert_eq!(stuck.undeclared_saturation(), [None; CHANNELS]);
         let black = statistics([0; 9000], 60_000);
-        assert_eq!((black.undeclared_white(), black.step()), (None, 1));
+        assert_eq!(
+            (black.undeclared_saturation(), black.step()),
+            ([None; CHANNELS], 1)
+        );
         // Declared, it is counted.
         let declared = statistics(codes(9000).map(|code| code.min(40_000)), 40_000);
-        assert!(declared.saturated > 64 && declared.undeclared_white().is_none());
+        assert!(declared.saturated > 64);
+        assert_eq!(declared.undeclared_saturation(), [None; CHANNELS]);
+        // Each channel for itself.
+        let mut green = CodeStatistics::of_photograph();
+        codes(9000).for_each(|code| green.add([code, code.min(30_000), code], [false; CHANNELS]));
+        assert_eq!(green.undeclared_saturation(), [None, Some(30_000), None]);
     }
 
     #[test]
@@ -144,7 +165,7 @@ mod tests {
         for factor in EIGHT_BIT_FACTORS {
             let eight_bits = statistics(codes(9000).map(|code| code / 257 * factor), 65_535);
             assert_eq!(eight_bits.step(), factor);
-            assert_eq!(eight_bits.undeclared_white(), None);
+            assert_eq!(eight_bits.undeclared_saturation(), [None; CHANNELS]);
         }
         assert_eq!(statistics(codes(9000), 60_000).step(), 1);
     }

@@ -5,11 +5,14 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::error::{CaptureError, CaptureErrorKind};
+use super::measurements::Pattern;
 use crate::calibrate::LightPlaneAxis;
-use crate::transport::{Correspondence, Extent, MAX_SIDE};
+use crate::transport::{CHANNELS, Correspondence, Extent, MAX_SIDE};
 
 /// Largest 16-bit code.
 const MAX_CODE: f64 = 65535.0;
+/// Largest share by which a display may dim.
+const MAX_DIMMING: f64 = 0.9;
 /// Bits 0 to 15 number the elements of the largest light plane.
 const MAX_GRAY_CODE_BIT: u32 = 15;
 
@@ -63,9 +66,12 @@ pub struct ManifestLight {
     /// Instead of gamma: measured pairs `[code, emitted]` in rising order, interpolated linearly.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub response: Option<Vec<[f64; 2]>>,
+    /// Share by which the display dims a picture with all elements lit; others in proportion to their mean emission.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dimming: Option<f64>,
 }
 
-/// The camera grid and its range of linear codes.
+/// The camera grid and its range of codes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ManifestCamera {
     /// Pixels along a row.
@@ -76,6 +82,44 @@ pub struct ManifestCamera {
     pub black: f64,
     /// Code at full scale: measurement 1.
     pub white: f64,
+    /// The tone curve of the photographs.
+    #[serde(default, skip_serializing_if = "CameraResponse::is_linear")]
+    pub response: CameraResponse,
+    /// Code from which on each channel is saturated; white if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub saturation: Option<[f64; CHANNELS]>,
+}
+
+/// How codes follow from light: the inverse of the camera's response function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CameraResponse {
+    /// In proportion to it.
+    #[default]
+    Linear,
+    /// By the transfer function of sRGB (IEC 61966-2-1).
+    Srgb,
+    /// Light is the code, as a share of white, to this power.
+    Gamma(f64),
+}
+
+impl CameraResponse {
+    /// Light from a code, both as shares of white. Noise puts some codes below black.
+    pub fn linearise(self, code: f64) -> f64 {
+        // One function fewer in a WebAssembly module than by `libm::pow`.
+        let power = |x: f64, gamma: f64| libm::exp(gamma * libm::log(x));
+        match self {
+            Self::Linear => code,
+            Self::Srgb if code <= 0.04045 => code / 12.92,
+            Self::Srgb => power((code + 0.055) / 1.055, 2.4),
+            Self::Gamma(_) if code <= 0.0 => 0.0,
+            Self::Gamma(gamma) => power(code, gamma),
+        }
+    }
+
+    fn is_linear(&self) -> bool {
+        *self == Self::Linear
+    }
 }
 
 /// A pattern and its photograph.
@@ -119,18 +163,40 @@ impl ManifestLight {
 
     /// Exactly one of gamma and response must be given, and be usable.
     fn check(&self) -> Result<(), CaptureErrorKind> {
+        let dimming = self.dimming.unwrap_or(0.0);
+        check_range(
+            (0.0..=MAX_DIMMING).contains(&dimming),
+            "light.dimming",
+            dimming,
+            "between 0 and 0.9",
+        )?;
         match (&self.response, self.gamma) {
             (Some(_), Some(_)) => Err(CaptureErrorKind::ConflictingResponse),
             (Some(table), None) if !is_valid_response(table) => {
                 Err(CaptureErrorKind::InvalidResponse)
             }
             (Some(_), None) => Ok(()),
-            (None, Some(gamma)) => {
-                let valid = (0.1..=10.0).contains(&gamma);
-                check_range(valid, "light.gamma", gamma, "between 0.1 and 10")
-            }
+            (None, Some(gamma)) => check_gamma("light.gamma", gamma),
             (None, None) => Err(CaptureErrorKind::MissingResponse),
         }
+    }
+
+    /// Dims a pattern as the display does.
+    pub fn dim(&self, pattern: &mut Pattern) {
+        let Some(dimming) = self.dimming else {
+            return;
+        };
+        let planes = match pattern {
+            Pattern::Grey(plane) => std::slice::from_mut(plane),
+            Pattern::Rgb(planes) => &mut planes[..],
+        };
+        let mean = |plane: &Vec<f32>| plane.iter().sum::<f32>() / plane.len() as f32;
+        let mean = planes.iter().map(mean).sum::<f32>() / planes.len() as f32;
+        let factor = 1.0 - dimming as f32 * mean;
+        planes
+            .iter_mut()
+            .flatten()
+            .for_each(|emission| *emission *= factor);
     }
 
     /// Emission at each of the 256 codes, 1 at full brightness.
@@ -152,10 +218,16 @@ impl ManifestCamera {
         Extent::new(self.width, self.height)
     }
 
-    /// `(code − black) / (white − black) / exposure`. The dark frame shows light, which scales with exposure, and is
-    /// therefore subtracted from this value, not from the code.
+    /// `(code − black) / (white − black)`, linearised, by exposure. The dark frame shows light, which scales with
+    /// exposure, and is therefore subtracted from this value, not from the code.
     pub fn linear(&self, code: u16, exposure: f64) -> f32 {
-        ((f64::from(code) - self.black) / (self.white - self.black) / exposure) as f32
+        let share = (f64::from(code) - self.black) / (self.white - self.black);
+        (self.response.linearise(share) / exposure) as f32
+    }
+
+    /// Whether a code of channel `c` is saturated.
+    pub fn is_saturated(&self, code: u16, c: usize) -> bool {
+        f64::from(code) >= self.saturation.map_or(self.white, |codes| codes[c])
     }
 }
 
@@ -214,6 +286,20 @@ impl Manifest {
         let allowed = format!("a 16-bit code above \"camera.black\", {black}");
         let valid = white > black && white <= MAX_CODE;
         check_range(valid, "camera.white", white, &allowed)?;
+        for (c, saturation) in camera.saturation.iter().flatten().enumerate() {
+            let valid = *saturation > black && *saturation <= white;
+            let allowed =
+                format!("above \"camera.black\", {black}, and at most \"camera.white\", {white}");
+            check_range(
+                valid,
+                &format!("camera.saturation[{c}]"),
+                saturation,
+                &allowed,
+            )?;
+        }
+        if let CameraResponse::Gamma(gamma) = camera.response {
+            check_gamma("camera.response.gamma", gamma)?;
+        }
         light.check()?;
         if self.shots.is_empty() {
             return Err(CaptureErrorKind::NoShots);
@@ -237,6 +323,15 @@ impl Manifest {
         }
         Ok(())
     }
+}
+
+fn check_gamma(field: &str, gamma: f64) -> Result<(), CaptureErrorKind> {
+    check_range(
+        (0.1..=10.0).contains(&gamma),
+        field,
+        gamma,
+        "between 0.1 and 10",
+    )
 }
 
 fn check_range(

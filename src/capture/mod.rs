@@ -33,6 +33,6 @@ pub use folder::{
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
 pub use folder::{GroundTruth, RELIT_FULL_SCALE};
 pub(crate) use group_ids::{group_count, group_ids};
-pub use manifest::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
+pub use manifest::{CameraResponse, GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
 pub use measurements::{LinearPhoto, Measurements, Pattern};
 pub use noise_model::NoiseModel;

@@ -34,11 +34,11 @@ pub fn read_patterns(
 pub fn read_sample_of(
     mut photo: PhotographRowReader<'_>,
     rows: &CameraRowSet,
-) -> Result<LinearPhoto> {
+) -> Result<(LinearPhoto, CodeStatistics)> {
     let mut samples = LinearPhoto::new();
     photo.read(rows, &mut samples)?;
-    photo.finish()?;
-    Ok(samples)
+    let codes = photo.finish()?;
+    Ok((samples, codes))
 }
 
 /// What the rows that were read say beside their samples.
@@ -46,6 +46,8 @@ pub fn read_sample_of(
 pub struct ReadSample {
     /// Of all rows of the photographs.
     pub codes: CodeStatistics,
+    /// Of all rows of the flood photograph, if there is one.
+    pub flood_codes: Option<CodeStatistics>,
     /// Number of pixels of the loaded rows that are filled from their neighbours.
     pub hot_pixels: usize,
 }
@@ -116,6 +118,10 @@ impl<'a> MeasurementReader<'a> {
             .noise
             .with_quantum(f64::from(codes.step()) * self.code);
         measurements.noise = NoiseModel::with_gain_from(measurements);
-        Ok(ReadSample { codes, hot_pixels })
+        Ok(ReadSample {
+            codes,
+            flood_codes: None,
+            hot_pixels,
+        })
     }
 }

@@ -129,13 +129,14 @@ impl<'a> SimulationPlan<'a> {
                     width: args.light.width,
                     height: args.light.height,
                     gamma: Some(MONITOR_GAMMA),
-                    response: None,
+                    ..ManifestLight::default()
                 },
                 camera: ManifestCamera {
                     width: args.camera.width,
                     height: args.camera.height,
                     black: Camera::BLACK,
                     white: Camera::WHITE,
+                    ..ManifestCamera::default()
                 },
                 dark: Some("photos/dark.png".to_owned()),
                 flood: Some("photos/flood.png".to_owned()),

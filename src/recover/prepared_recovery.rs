@@ -12,14 +12,43 @@ use super::method::Method;
 use super::pattern_check;
 use super::photometry::{
     self, CalibratedMeasurements, PhotographCorrection, PhotographFault, Photometry,
-    ResampledPhotographs,
+    ResampledPhotographs, ResponseHypothesis,
 };
 use super::pixelwise::PixelwiseRecovery;
 use super::preparation_input::{self, RecoveryPreparationInput};
 use super::sampling::{self, MIN_PATTERNS};
 use crate::capture::Measurements;
-use crate::job_executor::Executor;
+use crate::job_executor::{Cancelled, Executor};
 use crate::transport::{Basis, FloatTile, Geometry, TileRect, Window};
+
+/// The same as [`PreparedRecovery::response`], for measurements that no recovery can be prepared from: their photographs
+/// hardly follow from their patterns.
+///
+/// # Errors
+/// If the geometry is out of range, if the photographs are dark or overexposed, and if the executor is cancelled.
+pub async fn find_response(
+    measurements: &Measurements,
+    window: Window,
+    executor: &impl Executor,
+) -> Result<Option<ResponseHypothesis>, RecoverError> {
+    let geometry = preparation_input::geometry(measurements, window)?;
+    let split = HoldoutSplit::new(&measurements.patterns);
+    let preparation = RecoveryPreparationInput {
+        measurements: &CalibratedMeasurements::uncorrected(measurements),
+        geometry,
+        split: &split,
+        executor,
+    };
+    let mean = mean_function::mean_function(&preparation).await?;
+    let mean = mean_function::smooth(&mean, window.side() as usize);
+    Ok(photometry::find_response(
+        measurements,
+        geometry,
+        &mean,
+        &split.all,
+        executor,
+    )?)
+}
 
 /// Root mean square shift, in camera pixels, that costs accuracy although it is corrected.
 const MIN_TREMBLING: f64 = 0.05;
@@ -167,6 +196,39 @@ impl PreparedRecovery {
     /// The photographs that are left out, by their indices in the measurements, with the fault that each looks like.
     pub fn faults(&self) -> &[(usize, PhotographFault)] {
         &self.photometry.faults
+    }
+
+    /// Share by which the display dims a picture with all elements lit, and others in proportion to their mean emission,
+    /// as the flood photograph says. `None` if it does not, or if there is no such photograph. `measurements` are those
+    /// that the recovery was prepared from.
+    pub fn dimming(&self, measurements: &Measurements, executor: &impl Executor) -> Option<f64> {
+        let used = &self.split.all;
+        let input = (self.photometry).resampling_input(measurements, &self.geometry, used);
+        photometry::estimate_dimming(input, executor)
+    }
+
+    /// A response of display or camera with which the photographs predict one another better than with the declared one.
+    /// `None` if there is none, or too little is measured to tell. `measurements` are those that the recovery was prepared
+    /// from.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn response(
+        &self,
+        measurements: &Measurements,
+        executor: &impl Executor,
+    ) -> Result<Option<ResponseHypothesis>, Cancelled> {
+        let mean_function = &self.photometry.mean_function;
+        if mean_function.is_empty() {
+            return Ok(None);
+        }
+        photometry::find_response(
+            measurements,
+            self.geometry,
+            mean_function,
+            &self.split.all,
+            executor,
+        )
     }
 
     /// The validation on held-out patterns; `None` if there are too few patterns to hold any out.

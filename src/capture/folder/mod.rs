@@ -27,7 +27,7 @@ use super::error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 use super::manifest::{GrayCodeShot, Manifest};
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
-use crate::calibrate::GrayCodePhotos;
+use crate::calibrate::{BitPair, GrayCodePhotos, LightPlaneAxis};
 use crate::transport::{CHANNELS, Correspondence, Extent};
 
 /// Reads the size and the codes of a photograph that no manifest lists.
@@ -54,7 +54,7 @@ pub fn read_unlisted_pattern<F: CaptureFiles>(
 }
 
 /// A capture folder with its checked manifest.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct CaptureFolder<F = DiskFiles> {
     files: F,
     manifest: Manifest,
@@ -106,11 +106,23 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         // Some editors write a byte order mark, which is not JSON.
         let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
         let manifest = Manifest::parse(json, &path)?;
-        Ok(Self {
+        Ok(Self::new(files, manifest))
+    }
+
+    fn new(files: F, manifest: Manifest) -> Self {
+        Self {
             files,
             emission: manifest.light.emission(),
             manifest,
-        })
+        }
+    }
+
+    /// The same folder with another manifest.
+    pub fn with_manifest(&self, manifest: Manifest) -> Self
+    where
+        F: Clone,
+    {
+        Self::new(self.files.clone(), manifest)
     }
 
     /// The manifest.
@@ -148,29 +160,52 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         rows: &CameraRowSet,
     ) -> Result<GrayCodePhotos, CaptureError> {
         let light = &self.manifest.light;
-        GrayCodePhotos::collect(
-            light.extent(),
-            rows.iter().collect(),
-            |axis, bit, inverted| {
-                let mut shots = self.manifest.graycode.iter().enumerate();
-                let bit_of = |shot: &GrayCodeShot| (shot.axis, shot.bit, shot.inverted);
-                let found = shots.find(|(_, shot)| bit_of(shot) == (axis, bit, inverted));
-                let Some((i, shot)) = found else {
-                    let problem = CaptureErrorKind::MissingGrayCode {
-                        axis,
-                        bit,
-                        inverted,
-                    };
-                    return Err(CaptureError::new(self.manifest_path(), problem));
-                };
-                let field = format!("graycode[{i}].photo");
-                let mut reader = self.open_photo(&shot.photo, field, 1.0, dark)?;
-                let mut photo = LinearPhoto::new();
-                reader.read(rows, &mut photo)?;
-                reader.finish()?;
-                Ok(photo)
-            },
-        )
+        let listed = rows.iter().collect();
+        GrayCodePhotos::collect(light.extent(), listed, |axis, bit, inverted| {
+            self.read_gray_code_photo(dark, rows, (axis, bit, inverted))
+        })
+    }
+
+    /// Reads `rows` of the photographs of bit 0 of an axis.
+    ///
+    /// # Errors
+    /// Those of [`read_gray_code`](Self::read_gray_code).
+    pub fn read_finest_bit(
+        &self,
+        dark: &DarkFrame,
+        rows: &CameraRowSet,
+        axis: LightPlaneAxis,
+    ) -> Result<BitPair, CaptureError> {
+        let photo = |inverted| self.read_gray_code_photo(dark, rows, (axis, 0, inverted));
+        Ok(BitPair {
+            plain: photo(false)?,
+            inverted: photo(true)?,
+        })
+    }
+
+    fn read_gray_code_photo(
+        &self,
+        dark: &DarkFrame,
+        rows: &CameraRowSet,
+        (axis, bit, inverted): (LightPlaneAxis, u32, bool),
+    ) -> Result<LinearPhoto, CaptureError> {
+        let mut shots = self.manifest.graycode.iter().enumerate();
+        let bit_of = |shot: &GrayCodeShot| (shot.axis, shot.bit, shot.inverted);
+        let found = shots.find(|(_, shot)| bit_of(shot) == (axis, bit, inverted));
+        let Some((i, shot)) = found else {
+            let problem = CaptureErrorKind::MissingGrayCode {
+                axis,
+                bit,
+                inverted,
+            };
+            return Err(CaptureError::new(self.manifest_path(), problem));
+        };
+        let field = format!("graycode[{i}].photo");
+        let mut reader = self.open_photo(&shot.photo, field, 1.0, dark)?;
+        let mut photo = LinearPhoto::new();
+        reader.read(rows, &mut photo)?;
+        reader.finish()?;
+        Ok(photo)
     }
 
     /// Reads the dark frame; zeros if there is none.
@@ -235,7 +270,9 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         let name = &self.manifest.shots[i].pattern;
         let (light, field) = (self.manifest.light.extent(), format!("shots[{i}].pattern"));
         let file = CapturePng::new(&self.files, name, light, Some(field));
-        Ok(file.read_pattern(&self.emission)?.1)
+        let (_, mut pattern) = file.read_pattern(&self.emission)?;
+        self.manifest.light.dim(&mut pattern);
+        Ok(pattern)
     }
 
     /// Measurements of `shots` without any camera rows yet. Their noise has only its floor.

@@ -73,7 +73,6 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
         rows: &CameraRowSet,
         photo: &mut LinearPhoto,
     ) -> Result<(), CaptureError> {
-        let white = self.camera.white;
         let width = self.camera.width as usize;
         while self.next_row < end
             && let Some(codes) = self.codes.next()?
@@ -81,10 +80,9 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
             let is_selected = rows.contains(self.next_row);
             let dark = &self.dark.light[self.next_row as usize * width..][..width];
             for (codes, dark) in codes.zip(dark) {
-                let saturated = codes.map(|code| f64::from(code) >= white);
-                for (code, is_saturated) in codes.into_iter().zip(saturated) {
-                    self.statistics.add(code, is_saturated);
-                }
+                let saturated: [bool; CHANNELS] =
+                    std::array::from_fn(|c| self.camera.is_saturated(codes[c], c));
+                self.statistics.add(codes, saturated);
                 if is_selected {
                     photo.push(std::array::from_fn::<_, CHANNELS, _>(|c| {
                         match saturated[c] {

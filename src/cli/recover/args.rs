@@ -48,6 +48,9 @@ pub struct RecoverArgs {
     /// Limit on memory; photographs that do not fit are read in strips
     #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
     pub memory: ByteCount,
+    /// What to believe where the photographs contradict the responses in capture.json
+    #[arg(long, value_enum, default_value_t = TrustedCalibration::Declared)]
+    pub trust: TrustedCalibration,
     /// Continue an interrupted recovery from FILE.ltm.checkpoint
     #[arg(long)]
     pub resume: bool,
@@ -113,6 +116,25 @@ enum MethodName {
     Nnls,
     /// Basis pursuit denoising: the sparsest function that explains the photographs
     Bpdn,
+}
+
+/// What counts where photographs and manifest differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TrustedCalibration {
+    /// capture.json; differences are warnings
+    Declared,
+    /// Responses of display and camera as the photographs show them
+    Estimated,
+}
+
+impl TrustedCalibration {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Declared => "declared",
+            Self::Estimated => "estimated",
+        }
+    }
 }
 
 #[cfg(test)]

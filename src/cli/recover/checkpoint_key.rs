@@ -34,6 +34,8 @@ pub struct CheckpointKey {
     pub window: Option<u32>,
     /// `--patterns`, if given.
     pub patterns: Option<u32>,
+    /// `--trust`.
+    pub trust: String,
     /// `--memory`, unless all photographs fit in it.
     pub memory_bytes: Option<u64>,
     /// The files read, by their names in the manifest.
@@ -66,6 +68,7 @@ impl CheckpointKey {
             basis: method.basis().map(|basis| basis.name().to_owned()),
             window: args.window.map(Window::side),
             patterns: args.patterns,
+            trust: args.trust.name().to_owned(),
             memory_bytes: (!(plan.fits_photographs() && fits)).then_some(args.memory.0),
             files: files.collect::<Result<_>>()?,
             tiles: plan.tiles(),
@@ -90,7 +93,7 @@ impl CheckpointKey {
     }
 
     /// Names and values of the options.
-    fn options(&self) -> [(&'static str, String); 5] {
+    fn options(&self) -> [(&'static str, String); 6] {
         let text = |value: Option<String>, none: &str| value.unwrap_or_else(|| none.to_owned());
         let number = |value: Option<u64>, none| text(value.map(|value| value.to_string()), none);
         let memory = number(self.memory_bytes, "enough for all photographs");
@@ -102,6 +105,7 @@ impl CheckpointKey {
                 "--patterns",
                 number(self.patterns.map(u64::from), "not given"),
             ),
+            ("--trust", self.trust.clone()),
             ("--memory", memory),
         ]
     }

@@ -1,5 +1,7 @@
 //! Errors, warnings and notes of a recovery, in terms of the command line.
 
+use std::ops::Range;
+
 use anyhow::{Error, anyhow};
 use serde::Serialize;
 
@@ -10,8 +12,8 @@ use crate::export::{
     saturated_percent,
 };
 use crate::recover::{
-    CaptureFault, MIN_PATTERNS, PhotographCorrection, PhotographFault, PreparedRecovery,
-    TailEstimate,
+    CaptureFault, MIN_PATTERNS, MOVED_CODE, PhotographCorrection, PhotographFault,
+    PreparedRecovery, TailEstimate,
 };
 use crate::transport::Decibels;
 
@@ -19,6 +21,9 @@ use crate::transport::Decibels;
 const MIN_NOTED_DEVIATION: f64 = 1e-3;
 /// Least deviation of a single exposure from the others that is named.
 const MIN_NAMED_DEVIATION: f64 = 0.1;
+/// Contrast of the finest stripes of the Gray code in the sharpest pixels that shows a sharp display. Without any scattering,
+/// a blur of 0.5 light elements (standard deviation) leaves 0.79, and one of 0.57 leaves 0.7.
+const MIN_FINEST_CONTRAST: f32 = 0.7;
 /// Maximum number of shots or fields that a message names.
 const MAX_NAMED_ITEMS: usize = 4;
 
@@ -71,24 +76,37 @@ pub fn unknown_fields(folder: &CaptureFolder) -> Option<Warning> {
     })
 }
 
-/// Warns of codes that do not mean what the manifest says.
-pub fn codes(codes: &CodeStatistics, folder: &CaptureFolder) -> Vec<Warning> {
-    let manifest = folder.manifest_path().display().to_string();
-    let white = codes.undeclared_white().map(|code| Warning {
-        code: "saturation-undeclared",
-        message: format!(
-            "{manifest}: many samples have the code {code}, and hardly any those just below: they are saturated, but \
-             \"camera.white\" is {}; set it to {code}",
-            folder.manifest().camera.white
-        ),
-    });
-    let eight_bits = (codes.step() > 1).then(|| Warning {
+/// Warns of codes of 8 bits.
+pub fn eight_bits(codes: &CodeStatistics) -> Option<Warning> {
+    (codes.step() > 1).then(|| Warning {
         code: "photographs-8-bit",
         message: "the photographs have codes of 8 bits in files of 16: dark parts are inaccurate. Export 16 bits, linear, from \
                   the camera's raw files"
             .to_owned(),
-    });
-    white.into_iter().chain(eight_bits).collect()
+    })
+}
+
+/// Warns if nothing shows that the display is sharp; `contrast` is that of the finest bits of the Gray code.
+pub fn display_sharpness(contrast: f32) -> Option<Warning> {
+    (contrast < MIN_FINEST_CONTRAST).then(|| Warning {
+        code: "display-sharpness",
+        message: format!(
+            "no camera pixel shows the finest stripes of the Gray code with more than {:.0} % contrast: either the object \
+             scatters light over several elements everywhere, or the display is blurred, which would be part of the light \
+             transport and which held-out photographs cannot reveal. Show patterns without smooth scaling, and photograph \
+             a bare part of the display",
+            100.0 * contrast
+        ),
+    })
+}
+
+/// Why a display seems to dim bright pictures by `dimming`.
+pub fn dimming_reason(dimming: f64) -> String {
+    format!(
+        "the flood photograph is darker than the patterns predict: the display dims bright pictures, by {:.1} % when all \
+         elements are lit, unless the flood photograph has less exposure",
+        100.0 * dimming
+    )
 }
 
 /// Notes pixels that are filled from their neighbours.
@@ -334,30 +352,59 @@ pub fn capture_fault(
                  \"correspondence\": {{\"affine\": [{u:?}, {v:?}]}}"
             )
         }
-        CaptureFault::Moved {
-            first,
-            shift: [x, y],
-        } => {
-            let along = |distance: i32, [forward, backward]: [&str; 2]| {
-                let direction = if distance > 0 { forward } else { backward };
-                let plural = if distance.abs() == 1 { "" } else { "s" };
-                (distance != 0).then(|| format!("{} pixel{plural} {direction}", distance.abs()))
-            };
-            let distances = [
-                along(x, ["to the right", "to the left"]),
-                along(y, ["down", "up"]),
-            ];
-            let distances: Vec<String> = distances.into_iter().flatten().collect();
-            format!(
-                "the camera or the object moved before {}, by about {}: remove the shots before the move, or those after \
-                 it{}",
-                shot(first),
-                distances.join(" and "),
-                before(first),
-            )
-        }
+        CaptureFault::Moved { first, shift } => format!(
+            "{}: remove the shots before the move, or those after it{}",
+            moved_before(&shot(first), shift),
+            before(first),
+        ),
     };
     format!("{}: {text}", folder.manifest_path().display())
+}
+
+/// The warning of a camera that moved once, if only the photographs `still` are used.
+pub fn moved_once(
+    folder: &CaptureFolder,
+    shots: &[usize],
+    fault: CaptureFault,
+    still: &Range<usize>,
+) -> Option<Warning> {
+    let CaptureFault::Moved { first, shift } = fault else {
+        return None;
+    };
+    let shot = shots[first];
+    let name = format!("shots[{shot}] ({})", folder.manifest().shots[shot].photo);
+    let moved = shots.len() - still.len();
+    let side = if still.start == 0 {
+        "from then on"
+    } else {
+        "before"
+    };
+    Some(Warning {
+        code: MOVED_CODE,
+        message: format!(
+            "{}: {}: the {moved} photographs {side} are left out",
+            folder.manifest_path().display(),
+            moved_before(&name, shift),
+        ),
+    })
+}
+
+/// That the camera moved before a shot.
+fn moved_before(shot: &str, [x, y]: [i32; 2]) -> String {
+    let along = |distance: i32, [forward, backward]: [&str; 2]| {
+        let direction = if distance > 0 { forward } else { backward };
+        let plural = if distance.abs() == 1 { "" } else { "s" };
+        (distance != 0).then(|| format!("{} pixel{plural} {direction}", distance.abs()))
+    };
+    let distances = [
+        along(x, ["to the right", "to the left"]),
+        along(y, ["down", "up"]),
+    ];
+    let distances: Vec<String> = distances.into_iter().flatten().collect();
+    format!(
+        "the camera or the object moved before {shot}, by about {}",
+        distances.join(" and ")
+    )
 }
 
 /// The warning of a capture that is recovered although it has a fault.

@@ -3,10 +3,14 @@
 //! [`job`] reads the photographs, prepares a recovery, recovers its tiles into a [`checkpoint`] and encodes them.
 
 mod args;
+mod calibration;
+mod capture_sample;
 mod checkpoint;
 mod checkpoint_key;
+mod findings;
 mod job;
 mod messages;
+mod preparation;
 mod report;
 
 use std::time::Instant;
@@ -16,6 +20,7 @@ use anyhow::{Context, Result, bail};
 pub use self::args::RecoverArgs;
 pub use self::messages::StrictError;
 
+use self::capture_sample::SampleSource;
 use self::job::{RecoverJob, thread_pool};
 use super::output_file::{LTM, OutputFile};
 use super::process_resources::InterruptibleCores;
@@ -56,8 +61,10 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
         args,
         folder: &folder,
         shots: &shots,
-        plan: &plan,
-        cores: &cores,
+        source: SampleSource {
+            plan: &plan,
+            cores: &cores,
+        },
     };
     let report = thread_pool(plan.tiles_at_once())?.install(|| job.run())?;
     match args.json {

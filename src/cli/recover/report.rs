@@ -4,11 +4,12 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::args::RecoverArgs;
+use super::calibration::EstimatedField;
 use super::messages::Warning;
 use crate::capture::{CaptureFolder, Manifest, NoiseModel};
 use crate::cli::report::{format_bytes, format_shots, print_line};
 use crate::recover::{
-    CommonModeWeight, Method, PhotographCorrection, PhotographFault, PreparedRecovery,
+    CommonModeWeight, MOVED_CODE, Method, PhotographCorrection, PhotographFault, PreparedRecovery,
     SparsityBasis,
 };
 use crate::transport::Decibels;
@@ -42,6 +43,8 @@ pub struct RecoverReport {
     pub overexposed_pixels: usize,
     /// Number of hot pixels, which are filled from their neighbours.
     pub hot_pixels: usize,
+    /// Fields of the manifest that the photographs contradict.
+    pub estimated_fields: Vec<EstimatedField>,
     pub file_bytes: u64,
     /// One for each photograph that was read.
     #[serde(rename = "photograph_table")]
@@ -59,18 +62,28 @@ pub struct PhotographReport {
     pub gain: f64,
     /// Light in the photograph that does not come from the light plane, as a share of white.
     pub stray_light: f64,
-    /// Shift of the picture in camera pixels, to the right and down.
-    pub shift: [f64; 2],
+    /// Shift of the picture in camera pixels, to the right and down; none where the camera had moved by pixels.
+    pub shift: Option<[f64; 2]>,
     /// "used", or the code of the fault for which it is left out.
     pub verdict: &'static str,
 }
 
-/// Reports of the photographs of `shots`.
+/// Reports of the photographs of `shots`, and of the `moved` ones that were left out before.
 pub fn photograph_reports(
     folder: &CaptureFolder,
     shots: &[usize],
     recovery: &PreparedRecovery,
+    moved: &[usize],
 ) -> Vec<PhotographReport> {
+    let listed = &folder.manifest().shots;
+    let left_out = |&shot: &usize| PhotographReport {
+        shot,
+        photo: listed[shot].photo.clone(),
+        gain: 1.0,
+        stray_light: 0.0,
+        shift: None,
+        verdict: MOVED_CODE,
+    };
     let report = |(l, &shot): (usize, &usize)| {
         let correction = recovery.corrections().get(l).copied();
         let correction = correction.unwrap_or(PhotographCorrection::IDENTITY);
@@ -81,14 +94,17 @@ pub fn photograph_reports(
         };
         PhotographReport {
             shot,
-            photo: folder.manifest().shots[shot].photo.clone(),
+            photo: listed[shot].photo.clone(),
             gain: correction.gain(),
             stray_light: correction.stray_light(),
-            shift,
+            shift: Some(shift),
             verdict: fault.map_or("used", |(_, fault)| fault.code()),
         }
     };
-    shots.iter().enumerate().map(report).collect()
+    let mut reports: Vec<PhotographReport> = shots.iter().enumerate().map(report).collect();
+    reports.extend(moved.iter().map(left_out));
+    reports.sort_by_key(|report| report.shot);
+    reports
 }
 
 impl RecoverReport {

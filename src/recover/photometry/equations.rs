@@ -16,7 +16,7 @@ use crate::job_executor::{Cancelled, Executor, PARTS, share_of_jobs};
 use crate::linalg::{self, add_scaled, dot, vectorise};
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::sampling::{self, PixelsSharingWindow};
-use crate::transport::{LightElement, TileRect, Window};
+use crate::transport::{Geometry, LightElement, TileRect, Window};
 
 /// Most photographs whose equations fit in memory.
 pub(super) const MAX_PHOTOGRAPHS: usize = 256;
@@ -83,7 +83,7 @@ pub(super) async fn fit(
             };
             let measurements = input.calibrated(picture.as_ref().or(resampled.as_ref()));
             let preparation = &preparation.with(&measurements);
-            for_largest_window(preparation, *square, |origin, pixels| {
+            for_largest_window(&preparation.geometry, *square, |origin, pixels| {
                 vectorise(
                     #[cfg_attr(target_arch = "x86_64", inline(always))]
                     || {
@@ -103,11 +103,11 @@ pub(super) async fn fit(
 
 /// Gives the window that most pixels of a square share, and these pixels.
 pub(super) fn for_largest_window(
-    preparation: &RecoveryPreparationInput<'_, impl Executor>,
+    geometry: &Geometry,
     square: TileRect,
     mut visit: impl FnMut(LightElement, &PixelsSharingWindow),
 ) {
-    let windows = sampling::pixels_by_window(&preparation.geometry, square);
+    let windows = sampling::pixels_by_window(geometry, square);
     // The first of equals.
     let largest = windows.iter().rev().max_by_key(|(_, pixels)| pixels.len());
     if let Some((origin, pixels)) = largest {

@@ -23,6 +23,9 @@ const CONSTANT: usize = 0;
 const BRIGHTNESS: usize = 1;
 const FIRST_PHOTOGRAPH: usize = 2;
 
+/// Name in reports of photographs from another place.
+pub const MOVED_CODE: &str = "photograph-moved";
+
 /// Why a photograph does not belong to its capture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PhotographFault {
@@ -64,7 +67,7 @@ impl PhotographFault {
             Self::Blend { .. } => "photograph-blend",
             Self::UnknownPattern => "photograph-unknown-pattern",
             Self::OtherObject => "photograph-object",
-            Self::Moved { .. } => "photograph-moved",
+            Self::Moved { .. } => MOVED_CODE,
             Self::Distorted => "photograph-distorted",
         }
     }
@@ -158,7 +161,7 @@ fn add_square(
 ) {
     let (measurements, geometry) = (preparation.measurements, &preparation.geometry);
     let count = measurements.patterns.len();
-    for_largest_window(preparation, square, |origin, pixels| {
+    for_largest_window(geometry, square, |origin, pixels| {
         for (plane, channels) in measurements.planes() {
             let model = |indices: &[usize]| {
                 WindowModel::new(

@@ -17,22 +17,27 @@ use crate::capture::Measurements;
 use crate::transport::Geometry;
 
 mod calibrated_measurements;
+mod dimming;
 mod equations;
 mod estimate;
 mod faults;
 mod resampling;
+mod response;
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests;
 mod window_covariance;
 
 pub(super) use calibrated_measurements::CalibratedMeasurements;
 pub use calibrated_measurements::PhotographCorrection;
+pub(super) use dimming::estimate as estimate_dimming;
 pub(super) use equations::max_bytes;
 pub(super) use estimate::estimate;
-pub use faults::PhotographFault;
+pub use faults::{MOVED_CODE, PhotographFault};
 pub(super) use resampling::{
     HALO, ResampledPhotographs, ResamplingInput, max_prepared_bytes, max_tile_bytes,
 };
+pub use response::ResponseHypothesis;
+pub(super) use response::find as find_response;
 
 /// Corrections of the photographs, and those that are left out.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

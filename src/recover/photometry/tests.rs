@@ -1,11 +1,12 @@
 //! Photometry of synthetic captures whose faults are known.
 
 use super::*;
-use crate::capture::Measurements;
+use crate::capture::{Measurements, Pattern};
 use crate::job_executor::SequentialExecutor;
 use crate::recover::error::RecoverError;
 use crate::recover::holdout_split::HoldoutSplit;
 use crate::recover::mean_function::mean_function;
+use crate::recover::prediction::predictions;
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::test_problems::{SyntheticCapture, uniform};
 use crate::transport::{CHANNELS, CameraPixel, Extent, TileRect};
@@ -229,4 +230,29 @@ fn noisy_exposures_of_one_pattern_are_no_outliers() {
         }
     });
     assert!(photometry.faults.is_empty(), "{photometry:?}");
+}
+
+#[test]
+fn a_flood_photograph_that_is_dimmed_tells_by_how_much() {
+    let dimming = |factor: f32, stray: f32| {
+        let mut capture = SyntheticCapture::with_variation(PATTERNS, 0.1);
+        let lit = [Pattern::Grey(vec![1.0; capture.geometry.light.area()])];
+        let flood = predictions(&capture.geometry, &lit, &capture.functions(1.0));
+        let (pixels, _) = flood.as_chunks::<CHANNELS>();
+        let flood = pixels.iter().map(|y| y.map(|y| factor * y as f32 + stray));
+        capture.measurements.flood = Some(flood.collect());
+        let photometry = photometry_of(&capture);
+        let used: Vec<usize> = (0..PATTERNS).collect();
+        let input = photometry.resampling_input(&capture.measurements, &capture.geometry, &used);
+        estimate_dimming(input, &SequentialExecutor)
+    };
+    for stray in [0.0, 0.02] {
+        assert_eq!(dimming(1.0, stray), None);
+        assert_eq!(dimming(1.1, stray), None);
+        // Patterns have a mean emission of one half: this is a share of 0.2 for the flood.
+        let found = dimming(0.8 / 0.9, stray).unwrap();
+        assert!((found - 0.2).abs() < 0.01, "{found}");
+        // Another exposure.
+        assert_eq!(dimming(0.4, stray), None);
+    }
 }

@@ -16,10 +16,10 @@ use crate::transport::{CameraPixel, Extent, Geometry, LightElement};
 /// elements vary together.
 const RELATIVE_VARIANCE: f64 = 1.2;
 /// ε²: what no function explains, relative to brightness.
-const UNEXPLAINED_VARIANCE: f64 = 1e-5;
+pub(super) const UNEXPLAINED_VARIANCE: f64 = 1e-5;
 /// Variance of a pixel's measurements around those that the mean function predicts, relative to brightness; pixels with
 /// more noise than that say less.
-const MODEL_VARIANCE: f64 = 0.01;
+pub(super) const MODEL_VARIANCE: f64 = 0.01;
 
 /// What the model says of the photographs of a list at one window.
 pub(super) struct WindowModel {
@@ -84,8 +84,9 @@ impl WindowModel {
         Self::of_emissions(geometry, mean_function, origin, 1, |_, _| 1.0)
     }
 
+    /// For photographs with these emissions of element `m`.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
-    fn of_emissions(
+    pub fn of_emissions(
         geometry: &Geometry,
         mean_function: &[f64],
         origin: LightElement,

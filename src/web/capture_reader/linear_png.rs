@@ -55,6 +55,7 @@ pub fn read_photograph(
         height: extent.height,
         black,
         white,
+        ..ManifestCamera::default()
     };
     let linear = |code: u16| match f64::from(code) >= white {
         true => f32::NAN,

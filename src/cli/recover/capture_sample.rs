@@ -1,0 +1,89 @@
+//! The photographs that a recovery is prepared from.
+
+use anyhow::Result;
+
+use crate::calibrate::LightPlaneAxis;
+use crate::capture::{CaptureFolder, DarkFrame, Manifest, Measurements};
+use crate::cli::measurement_reader::{
+    MeasurementReader, ReadSample, read_patterns, read_sample_of,
+};
+use crate::cli::process_resources::InterruptibleCores;
+use crate::export::MemoryPlan;
+
+/// Axes of the light plane.
+const AXES: [LightPlaneAxis; 2] = [LightPlaneAxis::X, LightPlaneAxis::Y];
+
+/// Reads photographs as far as they fit in memory.
+#[derive(Clone, Copy)]
+pub struct SampleSource<'a> {
+    pub plan: &'a MemoryPlan,
+    pub cores: &'a InterruptibleCores,
+}
+
+/// Measurements of the rows that fit in memory, as the manifest says.
+pub struct CaptureSample {
+    pub folder: CaptureFolder,
+    /// Indices of the shots.
+    pub shots: Vec<usize>,
+    pub dark: DarkFrame,
+    pub measurements: Measurements,
+    pub read: ReadSample,
+}
+
+impl SampleSource<'_> {
+    /// Opens all files of the folder, calls `opened`, and reads them.
+    pub fn read(
+        &self,
+        folder: CaptureFolder,
+        shots: Vec<usize>,
+        opened: impl FnOnce() -> Result<()>,
+    ) -> Result<CaptureSample> {
+        let dark = folder.read_dark()?;
+        let flood = folder.open_flood(&dark)?;
+        let gray_code_rows = self.plan.gray_code_rows(folder.manifest().graycode.len());
+        let mut measurements = read_patterns(&folder, &dark, &shots, &gray_code_rows)?;
+        let reader = MeasurementReader::open(&folder, &dark, &shots)?;
+        opened()?;
+        let rows = self.plan.sample_rows();
+        let mut read = reader.read_sample(&mut measurements, &rows, self.cores)?;
+        if let Some(flood) = flood {
+            let (samples, codes) = read_sample_of(flood, &rows)?;
+            measurements.flood = Some(samples);
+            read.flood_codes = Some(codes);
+        }
+        Ok(CaptureSample {
+            folder,
+            shots,
+            dark,
+            measurements,
+            read,
+        })
+    }
+
+    /// The contrast of the finest bits of the Gray code in the sharpest camera pixels, along the axis where it is lower.
+    /// `None` if these photographs are missing, as nothing else needs them where the correspondence is declared.
+    pub fn finest_contrast(&self, sample: &CaptureSample) -> Option<f32> {
+        let rows = self.plan.gray_code_rows(2);
+        let contrast = |axis| {
+            let bit = sample.folder.read_finest_bit(&sample.dark, &rows, axis);
+            bit.ok()?.best_contrast()
+        };
+        let [x, y] = AXES.map(contrast);
+        Some(x?.min(y?))
+    }
+
+    /// Reads the same photographs by another manifest. Frees their memory before.
+    pub fn read_by(&self, sample: CaptureSample, manifest: Manifest) -> Result<CaptureSample> {
+        let folder = sample.folder.with_manifest(manifest);
+        let shots = sample.shots.clone();
+        drop(sample);
+        self.read(folder, shots, || Ok(()))
+    }
+
+    /// Reads the photographs of other shots. Frees the memory of the others before.
+    pub fn read_shots(&self, sample: CaptureSample, shots: Vec<usize>) -> Result<CaptureSample> {
+        let folder = sample.folder.clone();
+        drop(sample);
+        self.read(folder, shots, || Ok(()))
+    }
+}

@@ -1,0 +1,339 @@
+//! Prepares a recovery, and finds what is wrong with the photographs or with what `capture.json` declares of them.
+
+use anyhow::{Error, Result, bail};
+
+use super::args::{RecoverArgs, TrustedCalibration};
+use super::calibration;
+use super::capture_sample::{CaptureSample, SampleSource};
+use super::findings::Findings;
+use super::messages::{self, UnusableError};
+use crate::capture::{CaptureFolder, CodeStatistics, Manifest};
+use crate::cli::progress;
+use crate::export::{self, MIN_PLAUSIBLE_SNR, PreparedExport};
+use crate::recover::{
+    CaptureFault, PreparedRecovery, RecoverError, WindowSizeEstimate, diagnose, find_response,
+};
+use crate::transport::{Decibels, Window};
+
+/// SNR on held-out patterns below which hardly anything in a file would be right.
+const MIN_USABLE_SNR: Decibels = Decibels(2.0);
+/// Rise of the SNR on held-out patterns by which another response explains the photographs better.
+const MIN_SNR_RISE: Decibels = Decibels(0.3);
+/// Responses that are tried in turn.
+const MAX_TRIALS: usize = 3;
+/// Fewest photographs on one side of a move that are recovered alone.
+const MIN_STILL_PHOTOGRAPHS: usize = 24;
+
+/// A recovery that is ready to run, with the photographs that it is prepared from.
+pub struct PreparedCapture {
+    pub sample: CaptureSample,
+    pub prepared: PreparedExport,
+    pub findings: Findings,
+}
+
+/// What a recovery is prepared by.
+pub struct CapturePreparation<'a> {
+    pub args: &'a RecoverArgs,
+    /// As it is declared.
+    pub folder: &'a CaptureFolder,
+    pub source: SampleSource<'a>,
+}
+
+/// The photographs, the recovery that is prepared from them, and why it may be bad.
+struct Attempt {
+    sample: CaptureSample,
+    prepared: Result<PreparedExport, RecoverError>,
+    cause: Option<String>,
+}
+
+impl Attempt {
+    fn snr(&self) -> Option<Decibels> {
+        self.prepared.as_ref().ok()?.expected_snr()
+    }
+
+    /// Whether the photographs may not follow from their patterns.
+    fn is_doubtful(&self) -> bool {
+        use RecoverError::{IndistinctPhotographs, MismatchedPatterns, UncorrelatedPatterns};
+        match &self.prepared {
+            Ok(_) => self.snr().is_some_and(|snr| snr < MIN_PLAUSIBLE_SNR),
+            Err(error) => matches!(
+                error,
+                MismatchedPatterns { .. } | UncorrelatedPatterns | IndistinctPhotographs
+            ),
+        }
+    }
+
+    /// Indices of the photographs that are left out.
+    fn left_out(&self) -> Vec<usize> {
+        let recovery = self.prepared.as_ref().map(|prepared| &prepared.recovery);
+        let faults = recovery.map(PreparedRecovery::faults).unwrap_or_default();
+        faults.iter().map(|(l, _)| *l).collect()
+    }
+}
+
+impl CapturePreparation<'_> {
+    /// Prepares the recovery, with warnings of all that is doubtful.
+    ///
+    /// # Errors
+    /// If nothing can be recovered, if hardly anything would be right and neither `--force` is given, and after a warning
+    /// with `--strict`.
+    pub fn run(&self, sample: CaptureSample) -> Result<PreparedCapture> {
+        let mut findings = Findings::default();
+        findings.warn(messages::unknown_fields(self.folder));
+        let sample = self.with_saturation(sample, &mut findings)?;
+        findings.warn(messages::eight_bits(&sample.read.codes));
+        let saturated = sample.read.codes.saturated;
+        findings.warn(messages::saturation(saturated, &sample.measurements));
+        let contrast = self.source.finest_contrast(&sample);
+        findings.warn(contrast.and_then(messages::display_sharpness));
+        let attempt = self.attempt(sample);
+        let attempt = self.with_capture_fault(attempt, &mut findings)?;
+        let attempt = self.with_response(attempt, &mut findings)?;
+        let attempt = self.with_dimming(attempt, &mut findings)?;
+        let Attempt {
+            sample,
+            prepared,
+            cause,
+        } = attempt;
+        let prepared = match (prepared, cause.clone()) {
+            (Ok(prepared), _) => prepared,
+            (Err(_), Some(cause)) => bail!(cause),
+            (Err(error), None) => return Err(self.recover_error(error, &sample)),
+        };
+        findings.warn(messages::preparation(&prepared));
+        findings.warn(messages::photographs(
+            &sample.folder,
+            &sample.shots,
+            &prepared.recovery,
+        ));
+        let snr = prepared.expected_snr();
+        let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !self.args.force);
+        match (cause, unusable) {
+            (Some(cause), Some(_)) if !self.args.strict => {
+                bail!("{cause}; --force writes the file nevertheless")
+            }
+            (Some(cause), _) => findings.warn([messages::capture_warning(cause)]),
+            (None, _) => {}
+        }
+        findings.check(self.args.strict)?;
+        match unusable {
+            Some(snr) => bail!(UnusableError(snr)),
+            None => Ok(PreparedCapture {
+                sample,
+                prepared,
+                findings,
+            }),
+        }
+    }
+
+    /// Leaves out samples that are saturated though this is not declared.
+    fn with_saturation(
+        &self,
+        sample: CaptureSample,
+        findings: &mut Findings,
+    ) -> Result<CaptureSample> {
+        let codes = [Some(sample.read.codes), sample.read.flood_codes];
+        let codes: Vec<CodeStatistics> = codes.into_iter().flatten().collect();
+        let manifest = sample.folder.manifest();
+        let Some((manifest, field)) = calibration::with_saturation(manifest, &codes) else {
+            return Ok(sample);
+        };
+        findings.warn([calibration::saturation_warning(
+            &field,
+            &self.manifest_path(),
+        )]);
+        findings.estimated_fields.push(field);
+        self.source.read_by(sample, manifest)
+    }
+
+    /// Looks for a fault of the capture as a whole. If the camera moved once, only the photographs from one of its places
+    /// are used.
+    fn with_capture_fault(&self, attempt: Attempt, findings: &mut Findings) -> Result<Attempt> {
+        if !attempt.is_doubtful() {
+            return Ok(attempt);
+        }
+        let sample = &attempt.sample;
+        let fault = {
+            let _spinner = progress::spinner("looking for a cause");
+            let (window, cores) = (self.window(), self.source.cores);
+            diagnose(
+                &sample.measurements,
+                window,
+                &sample.shots,
+                &attempt.left_out(),
+                cores,
+            )?
+        };
+        let Some(fault) = fault else {
+            return Ok(attempt);
+        };
+        let still = match fault {
+            CaptureFault::Moved { first, .. } => still_photographs(sample.shots.len(), first),
+            _ => None,
+        };
+        let Some(still) = still else {
+            let cause =
+                messages::capture_fault(&sample.folder, &sample.shots, &sample.measurements, fault);
+            return Ok(Attempt {
+                cause: Some(cause),
+                ..attempt
+            });
+        };
+        findings.warn(messages::moved_once(
+            &sample.folder,
+            &sample.shots,
+            fault,
+            &still,
+        ));
+        let (moved, shots) = partition(&sample.shots, &still);
+        findings.moved_shots = moved;
+        let sample = self.source.read_shots(attempt.sample, shots)?;
+        Ok(self.attempt(sample))
+    }
+
+    /// Looks for responses of display and camera that explain the photographs better than those declared. Responses are
+    /// tried in turn, as one is estimated with the mean function that follows from the one before.
+    fn with_response(&self, declared: Attempt, findings: &mut Findings) -> Result<Attempt> {
+        let is_usable = declared.prepared.is_ok() || declared.is_doubtful();
+        if declared.cause.is_some() || !is_usable {
+            return Ok(declared);
+        }
+        let Some(mut manifest) = self.likely_manifest(&declared)? else {
+            return Ok(declared);
+        };
+        let original = declared.sample.folder.manifest().clone();
+        let declared_snr = declared.snr();
+        let Attempt {
+            mut sample,
+            prepared,
+            cause,
+        } = declared;
+        let mut best: Option<(Manifest, Decibels)> = None;
+        for _ in 0..MAX_TRIALS {
+            let trial = self.attempt(self.source.read_by(sample, manifest.clone())?);
+            let least = match (&best, declared_snr) {
+                (Some((_, snr)), _) => snr.0,
+                (None, Some(snr)) => snr.0 + MIN_SNR_RISE.0,
+                (None, None) => MIN_PLAUSIBLE_SNR.0,
+            };
+            let Some(snr) = trial.snr().filter(|snr| snr.0 > least) else {
+                sample = trial.sample;
+                break;
+            };
+            best = Some((manifest, snr));
+            let next = self.likely_manifest(&trial)?;
+            sample = trial.sample;
+            match next {
+                Some(next) => manifest = next,
+                None => break,
+            }
+        }
+        let is_used = best.is_some() && self.args.trust == TrustedCalibration::Estimated;
+        if let Some((estimated, snr)) = &best {
+            for mut field in calibration::changed_responses(&original, estimated) {
+                field.is_used = is_used;
+                let reason = calibration::response_reason(&field, declared_snr, *snr);
+                let warning = field.warning(&self.manifest_path(), &reason);
+                if prepared.is_err() && !is_used {
+                    bail!(warning.message);
+                }
+                findings.add_estimate(field, warning);
+            }
+        }
+        match best.filter(|_| is_used) {
+            Some((estimated, _)) => Ok(self.attempt(self.source.read_by(sample, estimated)?)),
+            None => Ok(Attempt {
+                sample: self.source.read_by(sample, original)?,
+                prepared,
+                cause,
+            }),
+        }
+    }
+
+    /// The manifest with another response, if one may explain the photographs better.
+    fn likely_manifest(&self, attempt: &Attempt) -> Result<Option<Manifest>> {
+        let (sample, cores) = (&attempt.sample, self.source.cores);
+        let measurements = &sample.measurements;
+        let found = match &attempt.prepared {
+            Ok(prepared) => prepared.recovery.response(measurements, cores)?,
+            Err(_) => pollster::block_on(find_response(measurements, self.window(), cores))
+                .map_err(|error| self.recover_error(error, sample))?,
+        };
+        Ok(found.map(|found| calibration::with_response(sample.folder.manifest(), found)))
+    }
+
+    /// Looks whether the display dims bright pictures.
+    fn with_dimming(&self, attempt: Attempt, findings: &mut Findings) -> Result<Attempt> {
+        let Ok(prepared) = &attempt.prepared else {
+            return Ok(attempt);
+        };
+        // A wrong response would seem to be dimming.
+        let is_linear = findings.estimated_fields.iter().all(|field| field.is_used);
+        let dimming = prepared
+            .recovery
+            .dimming(&attempt.sample.measurements, self.source.cores);
+        let Some(dimming) = dimming.filter(|_| is_linear) else {
+            return Ok(attempt);
+        };
+        let manifest = attempt.sample.folder.manifest();
+        let (amended, mut field) = calibration::with_dimming(manifest, dimming);
+        field.is_used = self.args.trust == TrustedCalibration::Estimated;
+        let is_used = field.is_used;
+        let warning = field.warning(&self.manifest_path(), &messages::dimming_reason(dimming));
+        findings.add_estimate(field, warning);
+        match is_used {
+            true => Ok(self.attempt(self.source.read_by(attempt.sample, amended)?)),
+            false => Ok(attempt),
+        }
+    }
+
+    /// Chooses the window, and learns or chooses what the method needs.
+    fn attempt(&self, sample: CaptureSample) -> Attempt {
+        let _spinner = progress::spinner("learning");
+        let (method, window) = (self.args.method(), self.args.window);
+        let preparation = export::prepare(&sample.measurements, method, window, self.source.cores);
+        Attempt {
+            prepared: pollster::block_on(preparation),
+            sample,
+            cause: None,
+        }
+    }
+
+    /// The window, or the largest that may be chosen.
+    fn window(&self) -> Window {
+        self.args.window.unwrap_or(WindowSizeEstimate::MAX_WINDOW)
+    }
+
+    fn manifest_path(&self) -> String {
+        self.folder.manifest_path().display().to_string()
+    }
+
+    /// Names the capture, or the shots, that an error of the recovery is about.
+    fn recover_error(&self, error: RecoverError, sample: &CaptureSample) -> Error {
+        match error {
+            RecoverError::Cancelled(cancelled) => cancelled.into(),
+            RecoverError::MismatchedPatterns { pattern_indices } => {
+                let shots = pattern_indices.iter().map(|&l| sample.shots[l]);
+                messages::mismatched_shots(self.folder, shots)
+            }
+            RecoverError::IndistinctPhotographs => Error::new(error).context(self.manifest_path()),
+            other => Error::new(other).context(self.args.capture.display().to_string()),
+        }
+    }
+}
+
+/// Which of `count` photographs show the object from the place of most, if the camera moved before photograph `first`: of
+/// equal numbers those before, as the Gray code. `None` if these are too few.
+fn still_photographs(count: usize, first: usize) -> Option<std::ops::Range<usize>> {
+    let still = match first >= count - first {
+        true => 0..first,
+        false => first..count,
+    };
+    (still.len() >= MIN_STILL_PHOTOGRAPHS).then_some(still)
+}
+
+/// The shots that moved, and those that are `still`.
+fn partition(shots: &[usize], still: &std::ops::Range<usize>) -> (Vec<usize>, Vec<usize>) {
+    let moved = [&shots[..still.start], &shots[still.end..]].concat();
+    (moved, shots[still.clone()].to_vec())
+}
