@@ -122,7 +122,7 @@ fn photograph(
         // Every channel's faults are the same.
         let mut random = random();
         for fault in &args.faults {
-            fault.change_emissions(&mut emissions, &mut others, &mut random);
+            fault.change_emissions(light, &mut emissions, &mut others, &mut random);
         }
         emissions.extend(others);
         pictures.push(channel_pictures(truth, c, &emissions));

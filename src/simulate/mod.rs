@@ -14,6 +14,7 @@ mod emission_matrix;
 mod gradient_noise;
 mod pattern_image;
 mod scene_kind;
+mod separable_filter;
 mod session_fault;
 mod signed_distance;
 mod simulated_capture;

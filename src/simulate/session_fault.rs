@@ -1,5 +1,6 @@
 //! Faults of a session of photographs: what rigs do to the pictures that a simulation computes.
 
+use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 
@@ -7,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
 use super::camera::Camera;
+use super::separable_filter::{blurred, shifted};
 use crate::capture::{LinearPhoto, Manifest};
 use crate::transport::{CHANNELS, Extent};
 
@@ -53,12 +55,20 @@ pub enum SessionFaultKind {
     Defects,
     /// Photographs are stored in 8 bits.
     EightBit,
+    /// The operating system enlarges pictures smoothly: a blur of this standard deviation in light elements.
+    Smooth,
+    /// The mains modulate the light by this amplitude, of which a rolling shutter shows three periods from the top to the
+    /// bottom.
+    Flicker,
 }
 
 use SessionFaultKind as Kind;
 
+/// Periods of flickering light in the time that a rolling shutter takes from the first row to the last.
+const FLICKER_PERIODS: f64 = 3.0;
+
 /// Kinds, their names, and the sizes that they have where none is given.
-const KINDS: [(&str, Kind, Option<f64>); 20] = [
+const KINDS: [(&str, Kind, Option<f64>); 22] = [
     ("underexposed", Kind::Underexposed, Some(0.5)),
     ("object", Kind::Object, None),
     ("pattern", Kind::Pattern, None),
@@ -79,6 +89,8 @@ const KINDS: [(&str, Kind, Option<f64>); 20] = [
     ("clip", Kind::Clip, Some(0.4)),
     ("defects", Kind::Defects, Some(0.001)),
     ("8-bit", Kind::EightBit, None),
+    ("smooth", Kind::Smooth, Some(0.5)),
+    ("flicker", Kind::Flicker, Some(0.01)),
 ];
 
 /// A fault and its size.
@@ -100,9 +112,10 @@ impl SessionFault {
         KINDS.into_iter().map(fault)
     }
 
-    /// Changes the emissions `[M]` of the patterns, and of other lights, which are `others`.
+    /// Changes the emissions `[M]` of the patterns on the `light` plane, and of other lights, which are `others`.
     pub fn change_emissions(
         self,
+        light: Extent,
         patterns: &mut [Vec<f32>],
         others: &mut [Vec<f32>],
         random: &mut ChaCha8Rng,
@@ -118,10 +131,17 @@ impl SessionFault {
                 }
             }
             Kind::Dimming => {
-                for light in patterns.iter_mut().chain(others) {
-                    let mean = light.iter().sum::<f32>() / light.len() as f32;
+                for emissions in patterns.iter_mut().chain(others) {
+                    let mean = emissions.iter().sum::<f32>() / emissions.len() as f32;
                     let factor = 1.0 - self.size as f32 * mean;
-                    light.iter_mut().for_each(|emission| *emission *= factor);
+                    emissions
+                        .iter_mut()
+                        .for_each(|emission| *emission *= factor);
+                }
+            }
+            Kind::Smooth => {
+                for emissions in patterns.iter_mut().chain(others) {
+                    *emissions = blurred(emissions, light, self.size);
                 }
             }
             _ => {}
@@ -186,6 +206,16 @@ impl SessionFault {
             Kind::Move => {
                 for picture in &mut pictures[middle..] {
                     *picture = shifted(picture, camera, [size, 0.6 * size]);
+                }
+            }
+            Kind::Flicker => {
+                for picture in pictures {
+                    let phase: f64 = StandardUniform.sample(random);
+                    let rows = picture.chunks_exact_mut(camera.width as usize);
+                    for (y, row) in rows.enumerate() {
+                        let periods = FLICKER_PERIODS * y as f64 / f64::from(camera.height);
+                        scale(row, 1.0 + size * (TAU * (periods + phase)).sin());
+                    }
                 }
             }
             _ => {}
@@ -299,43 +329,9 @@ impl FromStr for SessionFault {
     }
 }
 
-fn scale(picture: &mut LinearPhoto, factor: f64) {
+fn scale(picture: &mut [[f32; CHANNELS]], factor: f64) {
     let samples = picture.as_flattened_mut();
     samples.iter_mut().for_each(|y| *y *= factor as f32);
-}
-
-/// The picture shifted to the right and down, by the cubic convolution of Keys (1981). The border repeats.
-fn shifted(picture: &LinearPhoto, camera: Extent, [dx, dy]: [f64; 2]) -> LinearPhoto {
-    let (width, height) = (camera.width as usize, camera.height as usize);
-    let along =
-        |picture: &LinearPhoto, d: f64, length: usize, index: &dyn Fn(usize, usize) -> usize| {
-            let cell = (-d).floor();
-            let weights = [-1.0, 0.0, 1.0, 2.0].map(|k| keys(-d - cell - k));
-            let mut moved = picture.clone();
-            for line in 0..picture.len() / length {
-                for i in 0..length {
-                    let mut sum = [0.0; CHANNELS];
-                    for (k, weight) in weights.iter().enumerate() {
-                        let from = i as i64 + cell as i64 + k as i64 - 1;
-                        let from = index(line, from.clamp(0, length as i64 - 1) as usize);
-                        (0..CHANNELS).for_each(|c| sum[c] += weight * f64::from(picture[from][c]));
-                    }
-                    moved[index(line, i)] = sum.map(|y| y.max(0.0) as f32);
-                }
-            }
-            moved
-        };
-    let rows = along(picture, dx, width, &|row, x| row * width + x);
-    along(&rows, dy, height, &|column, y| y * width + column)
-}
-
-/// The kernel of cubic convolution.
-fn keys(x: f64) -> f64 {
-    match x.abs() {
-        x if x < 1.0 => 1.5 * x.powi(3) - 2.5 * x * x + 1.0,
-        x if x < 2.0 => -0.5 * x.powi(3) + 2.5 * x * x - 4.0 * x + 2.0,
-        _ => 0.0,
-    }
 }
 
 #[cfg(test)]
@@ -365,28 +361,6 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_is_shifted_to_the_right_and_down() {
-        let camera = Extent::new(12, 9);
-        let value = |x: f64, y: f64| (1.0 + 0.5 * (0.5 * x).sin() + 0.3 * (0.4 * y).cos()) as f32;
-        let picture: LinearPhoto = camera
-            .cells()
-            .map(|(x, y)| [value(f64::from(x), f64::from(y)); CHANNELS])
-            .collect();
-        let moved = shifted(&picture, camera, [1.25, -0.5]);
-        for (x, y) in camera
-            .cells()
-            .filter(|(x, y)| (4..9).contains(x) && (3..6).contains(y))
-        {
-            let expected = value(f64::from(x) - 1.25, f64::from(y) + 0.5);
-            let found = moved[(y * 12 + x) as usize][0];
-            assert!(
-                (found - expected).abs() < 0.01,
-                "{x} {y}: {found} {expected}"
-            );
-        }
-    }
-
-    #[test]
     fn faults_change_what_they_name() {
         let camera = Extent::new(8, 8);
         let clean: Vec<LinearPhoto> = (0..6)
@@ -410,10 +384,20 @@ mod tests {
         assert_eq!(changed("move"), [3, 4, 5]);
         assert_eq!(changed("exposure"), [1, 3, 5]);
         assert_eq!(changed("growing-room"), [1, 2, 3, 4, 5]);
-        for text in ["jitter", "room", "tremble"] {
+        for text in ["jitter", "room", "tremble", "flicker"] {
             assert_eq!(changed(text).len(), 6, "{text}");
         }
         assert_eq!(changed("clip"), [0; 0]);
+        let mut pictures = clean.clone();
+        let flicker: SessionFault = "flicker=0.1".parse().unwrap();
+        flicker.change_pictures(camera, &mut pictures, &mut RandomStreamId::Fault.start(1));
+        for (picture, clean) in pictures.iter().zip(&clean) {
+            let factors: Vec<f32> = (1..64).map(|n| picture[n][0] / clean[n][0]).collect();
+            assert!(factors.iter().all(|factor| (0.9..=1.1).contains(factor)));
+            // Rows are exposed one after the other, each as a whole.
+            assert!((factors[8] - factors[14]).abs() < 1e-4);
+            assert!((factors[8] - factors[16]).abs() > 1e-3);
+        }
         let codes = |text: &str| {
             let mut codes: Vec<[u16; CHANNELS]> =
                 (0..1000).map(|i| [600 + 50 * i; CHANNELS]).collect();
@@ -435,5 +419,23 @@ mod tests {
             (10, 10)
         );
         assert!(count("clip=0.5", (512.0f64 + 0.5 * 59_488.0) as u16) > 300);
+    }
+
+    #[test]
+    fn smooth_enlargement_blurs_patterns_and_other_lights() {
+        let light = Extent::new(9, 5);
+        let mut spot = vec![0.0; 45];
+        spot[2 * 9 + 4] = 1.0;
+        let (mut patterns, mut others) = (vec![spot.clone()], vec![spot, vec![1.0; 45]]);
+        let smooth: SessionFault = "smooth".parse().unwrap();
+        let mut random = RandomStreamId::Fault.start(1);
+        smooth.change_emissions(light, &mut patterns, &mut others, &mut random);
+        assert_eq!(patterns[0], others[0]);
+        assert!(patterns[0][2 * 9 + 4] < 0.7 && patterns[0][3 * 9 + 4] > 0.08);
+        assert!(
+            others[1]
+                .iter()
+                .all(|emission| (emission - 1.0).abs() < 1e-6)
+        );
     }
 }
