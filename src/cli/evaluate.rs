@@ -36,9 +36,9 @@ pub struct EvaluateArgs {
 }
 
 #[derive(Default, Serialize)]
-struct EvaluateReport {
+pub struct EvaluateReport {
     /// SNR of the whole matrix against the known transport; null without one.
-    snr_db: Option<Decibels>,
+    pub snr_db: Option<Decibels>,
     /// PSNR of relit pictures against the true ones, peak 1 in units of the measurement.
     relit: BTreeMap<String, Option<Decibels>>,
     /// SNR of predicted pictures against photographs that the recovery did not use.
@@ -77,6 +77,15 @@ struct HeldOutPhotograph {
 const MIN_SAME_OBJECT_SNR: Decibels = Decibels(3.0);
 
 pub fn run(args: &EvaluateArgs) -> Result<()> {
+    let report = evaluate(args)?;
+    match args.json {
+        true => print_json(&report),
+        false => report.print(),
+    }
+}
+
+/// Compares the file of `args` with its capture.
+pub fn evaluate(args: &EvaluateArgs) -> Result<EvaluateReport> {
     let file = read_ltm(&args.file, args.first)?;
     let header = &file.index.header;
     let folder = CaptureFolder::open(&args.capture)?;
@@ -105,10 +114,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
     }
     let used = file.index.metadata.read()?.shots_used;
     report.compare_with_photographs(&mut relighter, &folder, &used)?;
-    match args.json {
-        true => print_json(&report),
-        false => report.print(),
-    }
+    Ok(report)
 }
 
 impl EvaluateReport {

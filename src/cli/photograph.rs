@@ -44,6 +44,17 @@ fn fault_help() -> String {
 }
 
 pub fn run(args: &PhotographArgs) -> Result<()> {
+    let shots = write_capture(args)?;
+    eprintln!(
+        "{}: {shots} shots, {} faults",
+        args.output.display(),
+        args.faults.len()
+    );
+    Ok(())
+}
+
+/// Writes the new capture. Returns its number of shots.
+pub fn write_capture(args: &PhotographArgs) -> Result<usize> {
     let folder = CaptureFolder::open(&args.capture)?;
     let missing =
         "has no truth/ folder, so its transport is unknown and it cannot be photographed again";
@@ -51,13 +62,7 @@ pub fn run(args: &PhotographArgs) -> Result<()> {
     let truth = truth.with_context(|| args.capture.display().to_string())?;
     let session = photograph(args, &folder, &truth)?;
     output_folder::write_atomically(&args.output, |root| session.write(&args.capture, root))?;
-    eprintln!(
-        "{}: {} shots, {} faults",
-        args.output.display(),
-        session.manifest.shots.len(),
-        args.faults.len()
-    );
-    Ok(())
+    Ok(session.manifest.shots.len())
 }
 
 /// A session of photographs, in memory.

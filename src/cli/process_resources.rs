@@ -42,8 +42,9 @@ pub const INTERRUPTED_STATUS: u8 = 130;
 #[error("{0}")]
 pub struct Interrupted(pub String);
 
-/// Runs jobs on all cores until Ctrl-C or SIGTERM asks the process to stop. The second signal ends it at once.
-#[derive(Debug)]
+/// Runs jobs on all cores until Ctrl-C or SIGTERM asks the process to stop. The second signal ends it at once. The default
+/// has no signal handlers: the first signal ends the process.
+#[derive(Debug, Default)]
 pub struct InterruptibleCores {
     requested: Arc<AtomicBool>,
     /// Whether the user was told that the request arrived.
@@ -53,19 +54,16 @@ pub struct InterruptibleCores {
 impl InterruptibleCores {
     /// Installs the signal handlers; once a process.
     pub fn listen() -> Result<Self> {
-        let requested = Arc::new(AtomicBool::new(false));
+        let cores = Self::default();
         // Not SIGHUP, which `nohup` ignores for the process; without `nohup` the tiles are kept anyway.
         for signal in [SIGINT, SIGTERM] {
             // In this order: at the second signal the first handler sees the flag of the second.
             let status = INTERRUPTED_STATUS.into();
-            flag::register_conditional_shutdown(signal, status, Arc::clone(&requested))
-                .and_then(|_| flag::register(signal, Arc::clone(&requested)))
+            flag::register_conditional_shutdown(signal, status, Arc::clone(&cores.requested))
+                .and_then(|_| flag::register(signal, Arc::clone(&cores.requested)))
                 .context("cannot listen for Ctrl-C")?;
         }
-        Ok(Self {
-            requested,
-            acknowledged: AtomicBool::new(false),
-        })
+        Ok(cores)
     }
 }
 

@@ -22,6 +22,7 @@ pub use self::messages::StrictError;
 
 use self::capture_sample::SampleSource;
 use self::job::{RecoverJob, thread_pool};
+use self::report::RecoverReport;
 use super::output_file::{LTM, OutputFile};
 use super::process_resources::InterruptibleCores;
 use super::report::print_json;
@@ -31,7 +32,6 @@ use crate::export::{MemoryPlan, select_shots};
 use crate::recover::{MIN_PATTERNS, RecoverError, WindowSizeEstimate};
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
-    let start = Instant::now();
     if args.basis.is_some() && args.method().basis().is_none() {
         bail!(UsageError("--basis is for --method bpdn"));
     }
@@ -39,6 +39,20 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     // An output that cannot be written fails before the work.
     drop(OutputFile::create(&args.output, &LTM)?);
     let folder = CaptureFolder::open(&args.capture)?;
+    let report = recover(args, &folder, &cores)?;
+    match args.json {
+        true => print_json(&report),
+        false => report.print(args, folder.manifest()),
+    }
+}
+
+/// Recovers `folder`, the capture of `args`, and writes the file.
+pub fn recover(
+    args: &RecoverArgs,
+    folder: &CaptureFolder,
+    cores: &InterruptibleCores,
+) -> Result<RecoverReport> {
+    let start = Instant::now();
     let manifest = folder.manifest();
     let shots = select_shots(&manifest.shots, args.patterns.map(|k| k as usize))
         .map_err(messages::too_few_shots)?;
@@ -59,16 +73,9 @@ pub fn run(args: &RecoverArgs) -> Result<()> {
     let job = RecoverJob {
         start,
         args,
-        folder: &folder,
+        folder,
         shots: &shots,
-        source: SampleSource {
-            plan: &plan,
-            cores: &cores,
-        },
+        source: SampleSource { plan: &plan, cores },
     };
-    let report = thread_pool(plan.tiles_at_once())?.install(|| job.run())?;
-    match args.json {
-        true => print_json(&report),
-        false => report.print(args, manifest),
-    }
+    thread_pool(plan.tiles_at_once())?.install(|| job.run())
 }
