@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use assert_cmd::Command;
+use relightable_photo::simulate::SessionFault;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -21,10 +22,14 @@ fn text(path: &Path) -> &str {
 
 /// A small simulated capture, named `glass`, with its truth.
 fn capture(folder: &Path) -> PathBuf {
-    let capture = folder.join("glass");
     let size = ["--camera", "32x32", "--light", "16x16", "--patterns", "12"];
-    let simulate = ["simulate", "stained-glass", "-o", text(&capture)];
-    let output = run(&[&simulate, &size[..]].concat());
+    simulate(folder, "stained-glass", "glass", &size)
+}
+
+/// A capture of `scene` in `folder`, with the given name.
+fn simulate(folder: &Path, scene: &str, name: &str, size: &[&str]) -> PathBuf {
+    let capture = folder.join(name);
+    let output = run(&[&["simulate", scene, "-o", text(&capture)], size].concat());
     assert!(
         output.status.success(),
         "{}",
@@ -129,10 +134,49 @@ fn invalid_subjects_are_errors_before_any_work() {
     };
     assert_fails(&["nowhere"], "nowhere");
     assert_fails(&[text(&capture), text(&capture)], "named twice");
+    let usage = run(&["study", "scenes", "--faults", "-o", text(&results)]);
+    assert_eq!(usage.status.code(), Some(2));
     assert!(!results.exists());
     fs::remove_dir_all(capture.join("truth")).unwrap();
     assert_fails(&[text(&capture)], "truth/");
     fs::write(folder.path().join("mine"), "keep").unwrap();
     let output = run(&["study", "scenes", "-o", text(folder.path())]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("is not empty"));
+}
+
+#[test]
+fn a_capture_is_photographed_again_with_each_fault() {
+    let folder = TempDir::new().unwrap();
+    // About the smallest picture in which photographs are corrected, and the fastest method.
+    let size = ["--camera", "32x16", "--light", "16x8", "--patterns", "40"];
+    let capture = simulate(folder.path(), "cookies", "tray", &size);
+    let results = folder.path().join("results");
+    let study = ["study", text(&capture), "-o", text(&results)];
+    let output = run(&[&study[..], &["--faults", "--method", "nnls"]].concat());
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let (header, rows) = csv(&results.join("tray-faults.csv"));
+    assert_eq!(header, ["fault", "tray (dB)", "tray: reported"]);
+    let row = |name: &str| {
+        let row = rows.iter().find(|row| row[0] == name);
+        row.unwrap_or_else(|| panic!("no {name}: {rows:?}"))
+    };
+    for fault in SessionFault::all() {
+        row(&fault.to_string());
+    }
+    let snr = |name: &str| row(name)[1].parse::<f64>().unwrap();
+    assert!(snr("clean") > 30.0, "{rows:?}");
+    assert!((snr("clean") - snr("jitter=0.02")).abs() < 1.0, "{rows:?}");
+    assert_eq!(row("clean")[2], "");
+    assert_eq!(row("jitter=0.02")[2], "gain");
+    assert_eq!(row("swap")[2], "photograph-pattern (2)");
+    assert_eq!(row("mirror")[2], "refused: the correspondence is mirrored");
+    assert_eq!(row("gamma=1.8")[2], "—", "patterns are black and white");
+    let report = fs::read_to_string(results.join("results.md")).unwrap();
+    assert!(report.contains("--faults --method nnls`") && report.contains("| swap |"));
+    let files = fs::read_dir(&results).unwrap();
+    assert_eq!(files.count(), 2, "temporary folders are deleted");
 }

@@ -19,6 +19,7 @@ mod relight;
 mod report;
 mod simulate;
 mod study;
+mod study_faults;
 mod value_parsers;
 mod verify;
 

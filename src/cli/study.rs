@@ -3,19 +3,22 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
 use super::measurement_reader::{MeasurementReader, read_patterns};
 use super::output_folder;
 use super::process_resources::AllCoresExecutor;
+use super::recover::MethodName;
+use super::study_faults::FaultStudy;
+use super::value_parsers::UsageError;
 use crate::capture::{CameraRowSet, CaptureFolder, Measurements};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, SimulatedCapture, SimulatedScene, WINDOW_SIDE, first_shots};
 use crate::study::{self, CaptureTruth, EvaluationLight, ProgressLog, ReportSection, SNR_PATTERNS};
 use crate::transport::{Extent, KnownTransport};
 
-const PARTS: [&str; 4] = ["stained-glass", "cookies", "comparison", "scenes"];
+const PARTS: [&str; 5] = ["stained-glass", "cookies", "comparison", "scenes", "faults"];
 /// The paper's scale for glass: N = 262,144 and M = 65,536.
 const PAPER_CAMERA: Extent = Extent::new(512, 512);
 const PAPER_LIGHT: Extent = Extent::new(256, 256);
@@ -36,11 +39,11 @@ const INTRODUCTION: &str = "# Results\n\n\
     camera pixels. Figures are numbered as in the paper (Thanikachalam et al. 2014). \
     `ltm-export study` writes this page.\n";
 
-/// Measure the accuracy of recovery with known transport: the paper's figures, its comparison, many scenes
+/// Measure the accuracy of recovery with known transport: the paper's figures, its comparison, many scenes, faults of rigs
 #[derive(Debug, Args)]
 pub struct StudyArgs {
     /// Capture folders with truth/, or parts of the study: stained-glass, cookies (figures at the paper's scale),
-    /// comparison, scenes [default: these four]
+    /// comparison, scenes, faults [default: these five]
     #[arg(value_name = "CAPTURE|PART", default_values = PARTS, hide_default_value = true)]
     subjects: Vec<PathBuf>,
     /// Folder for results.md, images and CSV; must be new or empty
@@ -51,15 +54,26 @@ pub struct StudyArgs {
     #[arg(long, value_name = "N", default_value_t = DEFAULT_PIXELS as u32,
           value_parser = clap::value_parser!(u32).range(1..))]
     pixels: u32,
+    /// Photograph the captures again with each fault of `photograph --fault`, and recover them, rather than draw figures
+    #[arg(long)]
+    faults: bool,
+    /// Recovery method with --faults
+    #[arg(long, value_enum, default_value_t = MethodName::Learned, requires = "faults")]
+    method: MethodName,
 }
 
 pub fn run(args: &StudyArgs) -> Result<()> {
+    if args.faults && args.subjects.iter().any(|path| is_part(path)) {
+        bail!(UsageError(
+            "--faults is for captures; the part \"faults\" is for the built-in scenes"
+        ));
+    }
     let start = Instant::now();
     let progress = |text: &str| eprintln!("[{:7.1} s] {text}", start.elapsed().as_secs_f64());
     // Errors are found before the work, which may take an hour.
     let mut subjects: Vec<StudySubject> = Vec::new();
     for path in &args.subjects {
-        let subject = StudySubject::new(path, args.pixels as usize, &progress)?;
+        let subject = StudySubject::new(path, args, &progress)?;
         let name = &subject.name;
         ensure!(
             subjects.iter().all(|other| other.name != *name),
@@ -72,13 +86,16 @@ pub fn run(args: &StudyArgs) -> Result<()> {
         let mut text = INTRODUCTION.to_owned();
         for subject in &subjects {
             let part_start = Instant::now();
-            let option = match subject.pixels {
+            let mut option = match subject.pixels {
                 DEFAULT_PIXELS => String::new(),
                 other => format!(" --pixels {other}"),
             };
+            if let Some(method) = subject.fault_method {
+                option += &format!(" --faults --method {}", method.name());
+            }
             let name = &subject.name;
             text += &format!("\nFrom `ltm-export study {name} -o DIR{option}`:\n");
-            for section in subject.study()? {
+            for section in subject.study(root)? {
                 for (path, bytes) in &section.files {
                     write(&root.join(path), bytes)?;
                 }
@@ -98,6 +115,10 @@ pub fn run(args: &StudyArgs) -> Result<()> {
     Ok(())
 }
 
+fn is_part(path: &Path) -> bool {
+    PARTS.iter().any(|part| Path::new(part) == path)
+}
+
 /// A built-in part of the study, or a capture to study.
 struct StudySubject<'a> {
     /// The name of a part, or the path of a capture folder; of one named like a part, for instance `./cookies`.
@@ -105,12 +126,14 @@ struct StudySubject<'a> {
     is_part: bool,
     name: String,
     pixels: usize,
+    /// With which method a capture's faults are studied; none for its figures.
+    fault_method: Option<MethodName>,
     progress: ProgressLog<'a>,
 }
 
 impl<'a> StudySubject<'a> {
-    fn new(path: &'a Path, pixels: usize, progress: ProgressLog<'a>) -> Result<Self> {
-        let is_part = PARTS.iter().any(|part| Path::new(part) == path);
+    fn new(path: &'a Path, args: &StudyArgs, progress: ProgressLog<'a>) -> Result<Self> {
+        let is_part = is_part(path);
         let folder = match is_part {
             true => path.to_owned(),
             false => {
@@ -126,14 +149,19 @@ impl<'a> StudySubject<'a> {
             path,
             is_part,
             name: name.to_string_lossy().into_owned(),
-            pixels,
+            pixels: args.pixels as usize,
+            fault_method: args.faults.then_some(args.method),
             progress,
         })
     }
 
-    fn study(&self) -> Result<Vec<ReportSection>> {
+    /// Temporary files are written into folders in `root`.
+    fn study(&self, root: &Path) -> Result<Vec<ReportSection>> {
         if !self.is_part {
-            let sections = self.study_capture();
+            let sections = match self.fault_method {
+                Some(method) => self.study_faults(method, root),
+                None => self.study_capture(),
+            };
             return sections.with_context(|| self.path.display().to_string());
         }
         match self.name.as_str() {
@@ -148,6 +176,10 @@ impl<'a> StudySubject<'a> {
                     Ok(section)
                 };
                 kinds.zip(PARTS).map(compare).collect()
+            }
+            "faults" => {
+                let study = FaultStudy::new(root, MethodName::Learned, self.progress)?;
+                Ok(vec![study.study_scenes()?])
             }
             _ => {
                 let section = study::scenes_table(self.pixels, CORES, self.progress)?;
@@ -168,6 +200,12 @@ impl<'a> StudySubject<'a> {
         let measurements = camera.measure(kind.ensemble(), max_patterns, CORES);
         let lights = study::built_in_lights(PAPER_LIGHT);
         self.figures(&camera, measurements, lights)
+    }
+
+    /// The faults of rigs for a capture with known transport.
+    fn study_faults(&self, method: MethodName, root: &Path) -> Result<Vec<ReportSection>> {
+        let study = FaultStudy::new(root, method, self.progress)?;
+        Ok(vec![study.study_capture(&self.name, self.path)?])
     }
 
     /// The paper's figures for a capture with known transport.

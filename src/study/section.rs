@@ -24,7 +24,8 @@ impl ReportSection {
         }
     }
 
-    pub(super) fn add_paragraph(&mut self, text: &str) {
+    /// Adds a paragraph, or a table in Markdown.
+    pub fn add_paragraph(&mut self, text: &str) {
         self.markdown += &format!("\n{}\n", text.trim_end());
     }
 

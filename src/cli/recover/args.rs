@@ -109,13 +109,21 @@ fn parse_window(text: &str) -> Result<WindowArg, String> {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum MethodName {
+pub enum MethodName {
     /// A prior learned from the photographs themselves
     Learned,
     /// Non-negative least squares
     Nnls,
     /// Basis pursuit denoising: the sparsest function that explains the photographs
     Bpdn,
+}
+
+impl MethodName {
+    /// As on the command line.
+    pub fn name(self) -> String {
+        let value = self.to_possible_value();
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
 }
 
 /// What counts where photographs and manifest differ.

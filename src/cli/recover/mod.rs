@@ -17,12 +17,12 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-pub use self::args::RecoverArgs;
+pub use self::args::{MethodName, RecoverArgs};
 pub use self::messages::StrictError;
+pub use self::report::RecoverReport;
 
 use self::capture_sample::SampleSource;
 use self::job::{RecoverJob, thread_pool};
-use self::report::RecoverReport;
 use super::output_file::{LTM, OutputFile};
 use super::process_resources::InterruptibleCores;
 use super::report::print_json;
