@@ -14,12 +14,12 @@ use clap::{Args, Command};
 use tempfile::TempDir;
 
 use super::process_resources::InterruptibleCores;
-use super::recover::{MethodName, RecoverReport};
+use super::recover::{MethodName, RecoverReport, TrustedCalibration};
 use super::{evaluate, photograph, recover, simulate};
 use crate::capture::{CaptureFolder, MANIFEST_NAME};
 use crate::simulate::{SessionFault, SessionFaultKind};
 use crate::study::{FaultOutcome, FaultedCapture, ProgressLog, ReportSection, fault_table};
-use crate::transport::CHANNELS;
+use crate::transport::{CHANNELS, Decibels};
 
 /// Built-in scenes.
 const SCENES: [&str; 2] = ["stained-glass", "cookies"];
@@ -178,22 +178,44 @@ impl<'a> FaultStudy<'a> {
         arguments.push(format!("--seed={seed}").into());
         arguments.extend(faults.iter().map(|fault| format!("--fault={fault}").into()));
         photograph::write_capture(&parse(arguments)?)?;
-        let folder = CaptureFolder::open(&faulty)?;
-        let mut arguments: Vec<OsString> = vec![faulty.clone().into(), "-o".into()];
-        arguments.extend([file.clone().into(), "--lossless".into()]);
+        let (report, snr) = match self.recover(&faulty, &file, TrustedCalibration::Declared)? {
+            Ok(recovered) => recovered,
+            Err(reason) => return Ok(FaultOutcome::Refused(reason)),
+        };
+        let has_estimates = report.estimated_fields.iter().any(|field| !field.is_used);
+        let trusted = match has_estimates {
+            true => self
+                .recover(&faulty, &file, TrustedCalibration::Estimated)?
+                .ok(),
+            false => None,
+        };
+        Ok(FaultOutcome::Recovered {
+            snr,
+            trusted_snr: trusted.and_then(|(_, snr)| snr),
+            findings: findings(&report),
+        })
+    }
+
+    /// Recovers the folder `capture` and evaluates it: the report and the SNR, or why it is refused.
+    fn recover(
+        &self,
+        capture: &Path,
+        file: &Path,
+        trust: TrustedCalibration,
+    ) -> Result<Result<(RecoverReport, Option<Decibels>), String>> {
+        let folder = CaptureFolder::open(capture)?;
+        let mut arguments: Vec<OsString> = vec![capture.into(), "-o".into()];
+        arguments.extend([file.into(), "--lossless".into()]);
         arguments.push(format!("--method={}", self.method.name()).into());
-        let recovered = recover::recover(&parse(arguments)?, &folder, &self.cores);
-        let report = match recovered {
+        arguments.push(format!("--trust={}", trust.name()).into());
+        let report = match recover::recover(&parse(arguments)?, &folder, &self.cores) {
             Ok(report) => report,
             // Not the fault's doing.
             Err(error) if error.chain().any(|cause| cause.is::<io::Error>()) => return Err(error),
-            Err(error) => return Ok(FaultOutcome::Refused(first_clause(&error, &faulty))),
+            Err(error) => return Ok(Err(first_clause(&error, capture))),
         };
-        let evaluated = evaluate::evaluate(&parse([&file, &faulty])?)?;
-        Ok(FaultOutcome::Recovered {
-            snr: evaluated.snr_db,
-            findings: findings(&report),
-        })
+        let evaluated = evaluate::evaluate(&parse([file, capture])?)?;
+        Ok(Ok((report, evaluated.snr_db)))
     }
 
     /// What is reported of captures without faults.
@@ -261,7 +283,10 @@ fn findings(report: &RecoverReport) -> Vec<String> {
             "stray_light",
             used.iter().any(|photo| photo.stray_light != 0.0),
         ),
-        ("shift", used.iter().any(|photo| photo.shift != [0.0; 2])),
+        (
+            "shift",
+            used.iter().any(|photo| photo.shift != Some([0.0; 2])),
+        ),
         ("hot_pixels", report.hot_pixels > 0),
     ];
     let corrections = corrections.into_iter().filter(|(_, is_found)| *is_found);
@@ -280,6 +305,8 @@ fn findings(report: &RecoverReport) -> Vec<String> {
             findings.push(warning.code.to_owned());
         }
     }
+    let values = report.estimated_fields.iter();
+    findings.extend(values.map(|field| format!("{} {}", field.field, field.estimated)));
     findings
 }
 

@@ -13,6 +13,8 @@ pub enum FaultOutcome {
     Recovered {
         /// SNR of the recovered transport against the known one.
         snr: Option<Decibels>,
+        /// The same with `--trust estimated`, if that differs.
+        trusted_snr: Option<Decibels>,
         /// Names of what the recovery corrects, leaves out and warns of.
         findings: Vec<String>,
     },
@@ -33,7 +35,15 @@ impl FaultOutcome {
     pub fn report(&self) -> String {
         match self {
             Self::Inapplicable => "—".to_owned(),
-            Self::Recovered { findings, .. } => findings.join(", "),
+            Self::Recovered {
+                findings,
+                trusted_snr,
+                ..
+            } => {
+                let trusted = trusted_snr.map(|snr| format!("{snr} with the estimate"));
+                let parts: Vec<String> = findings.iter().cloned().chain(trusted).collect();
+                parts.join(", ")
+            }
             Self::Refused(reason) => format!("refused: {reason}"),
         }
     }
@@ -73,7 +83,8 @@ pub fn fault_table(
         "`ltm-export photograph --fault` photographs a capture again with each fault, and `ltm-export recover --lossless` \
          recovers it: SNR of T in dB, and what `recover` reports. `gain`, `stray_light` and `shift` of photographs are \
          corrected, and `hot_pixels` filled; the other words are codes of warnings and of photographs that are left out, with \
-         their numbers (docs/capture.md explains faults and codes). “—”: the capture cannot have this fault.",
+         their numbers (docs/capture.md explains faults and codes). Where a response is told that differs from the declared one, \
+         `--trust estimated` recovers with the estimate. “—”: the capture cannot have this fault.",
     );
     section.add_paragraph(&table.markdown());
     section.add_csv(file_name, &table)?;
@@ -89,6 +100,7 @@ mod tests {
         let outcomes = vec![
             FaultOutcome::Recovered {
                 snr: Some(Decibels(30.0)),
+                trusted_snr: Some(Decibels(31.0)),
                 findings: vec!["gain".to_owned(), "low-snr".to_owned()],
             },
             FaultOutcome::Refused("too dark".to_owned()),
@@ -104,12 +116,12 @@ mod tests {
         assert_eq!(path, "faults.csv");
         assert_eq!(
             String::from_utf8_lossy(csv),
-            "fault,tray (dB),tray: reported\njitter,30.00,\"gain, low-snr\"\nslip,,refused: too dark\ngamma,,—\n"
+            "fault,tray (dB),tray: reported\njitter,30.00,\"gain, low-snr, 31.00 dB with the estimate\"\nslip,,refused: too dark\ngamma,,—\n"
         );
         assert!(
             section
                 .markdown
-                .contains("| jitter | 30.00 | gain, low-snr |")
+                .contains("| jitter | 30.00 | gain, low-snr, 31.00 dB with the estimate |")
         );
     }
 }

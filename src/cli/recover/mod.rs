@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-pub use self::args::{MethodName, RecoverArgs};
+pub use self::args::{MethodName, RecoverArgs, TrustedCalibration};
 pub use self::messages::StrictError;
 pub use self::report::RecoverReport;
 
