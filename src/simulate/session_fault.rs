@@ -21,7 +21,7 @@ pub enum SessionFaultKind {
     Object,
     /// One photograph is of a pattern from another session.
     Pattern,
-    /// One photograph has this share of its light from the next pattern.
+    /// One photograph has this share of its light from the pattern before.
     Blend,
     /// Two photographs are swapped.
     Swap,
@@ -164,11 +164,11 @@ impl SessionFault {
         match self.kind {
             Kind::Underexposed => scale(&mut pictures[middle], size),
             Kind::Object => pictures[middle].reverse(),
-            Kind::Blend if middle + 1 < count => {
-                let next = pictures[middle + 1].clone();
-                for (y, next) in pictures[middle].iter_mut().zip(next) {
+            Kind::Blend if middle > 0 => {
+                let before = pictures[middle - 1].clone();
+                for (y, before) in pictures[middle].iter_mut().zip(before) {
                     for c in 0..CHANNELS {
-                        y[c] += size as f32 * (next[c] - y[c]);
+                        y[c] += size as f32 * (before[c] - y[c]);
                     }
                 }
             }

@@ -337,12 +337,8 @@ mod tests {
         let mut capture = SyntheticCapture::with_variation(PATTERNS, 0.1);
         change(&mut capture.measurements);
         let window = capture.geometry.window;
-        pollster::block_on(find_response(
-            &capture.measurements,
-            window,
-            &SequentialExecutor,
-        ))
-        .unwrap()
+        let found = find_response(&capture.measurements, window, &SequentialExecutor);
+        pollster::block_on(found).unwrap_or_else(|error| panic!("{error}"))
     }
 
     fn change_samples(measurements: &mut Measurements, change: impl Fn(f32) -> f32) {
