@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::capture_writer::{MAX_ELECTRONS, gray_code_shot, write_png};
 use super::{output_folder, progress};
 use crate::capture::{
-    CaptureFolder, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, Pattern, Shot,
+    CaptureFolder, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, ManifestCamera, Pattern, Shot,
 };
 use crate::simulate::{Camera, GrayCodePattern, PatternImage, RandomStreamId, SessionFault};
 use crate::transport::{CHANNELS, Extent};
@@ -92,7 +92,16 @@ fn photograph(
     );
     let (light, camera) = (truth.light_plane, truth.camera);
     let mut manifest = original.clone();
-    (manifest.camera.black, manifest.camera.white) = (Camera::BLACK, Camera::WHITE);
+    // These photographs are of another camera, and of a display that does not dim.
+    manifest.camera = ManifestCamera {
+        width: camera.width,
+        height: camera.height,
+        black: Camera::BLACK,
+        white: Camera::WHITE,
+        ..ManifestCamera::default()
+    };
+    manifest.light.dimming = None;
+    let folder = &folder.with_manifest(manifest.clone());
     manifest.dark = Some("photos/dark.png".to_owned());
     manifest.flood = Some("photos/flood.png".to_owned());
     let gray_code = GrayCodePattern::all(light);

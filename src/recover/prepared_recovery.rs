@@ -18,7 +18,7 @@ use super::pixelwise::PixelwiseRecovery;
 use super::preparation_input::{self, RecoveryPreparationInput};
 use super::sampling::{self, MIN_PATTERNS};
 use crate::capture::Measurements;
-use crate::job_executor::{Cancelled, Executor};
+use crate::job_executor::Executor;
 use crate::transport::{Basis, FloatTile, Geometry, TileRect, Window};
 
 /// The same as [`PreparedRecovery::response`], for measurements that no recovery can be prepared from: their photographs
@@ -212,23 +212,21 @@ impl PreparedRecovery {
     /// from.
     ///
     /// # Errors
-    /// [`Cancelled`].
-    pub fn response(
+    /// Those of [`find_response`].
+    pub async fn response(
         &self,
         measurements: &Measurements,
         executor: &impl Executor,
-    ) -> Result<Option<ResponseHypothesis>, Cancelled> {
+    ) -> Result<Option<ResponseHypothesis>, RecoverError> {
         let mean_function = &self.photometry.mean_function;
+        // Photometry found the photographs too different from what their patterns predict.
         if mean_function.is_empty() {
-            return Ok(None);
+            return find_response(measurements, self.geometry.window, executor).await;
         }
-        photometry::find_response(
-            measurements,
-            self.geometry,
-            mean_function,
-            &self.split.all,
-            executor,
-        )
+        let used = &self.split.all;
+        let found =
+            photometry::find_response(measurements, self.geometry, mean_function, used, executor);
+        Ok(found?)
     }
 
     /// The validation on held-out patterns; `None` if there are too few patterns to hold any out.

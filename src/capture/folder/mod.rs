@@ -229,7 +229,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         Ok(DarkFrame { light, noise })
     }
 
-    /// Opens the flood photograph, if the manifest names one.
+    /// Opens the flood photograph, if the manifest names one, as it were if the display did not dim.
     ///
     /// # Errors
     /// If it is missing or not a 16-bit PNG of the camera's size.
@@ -238,7 +238,8 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         dark: &'a DarkFrame,
     ) -> Result<Option<PhotographRowReader<'a, F>>, CaptureError> {
         let flood = self.manifest.flood.as_ref();
-        let open = |name: &'a String| self.open_photo(name, "flood".to_owned(), 1.0, dark);
+        let brightness = 1.0 - self.manifest.light.dimming.unwrap_or(0.0);
+        let open = |name: &'a String| self.open_photo(name, "flood".to_owned(), brightness, dark);
         flood.map(open).transpose()
     }
 

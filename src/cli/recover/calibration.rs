@@ -8,7 +8,7 @@ use crate::capture::{CameraResponse, CodeStatistics, Manifest};
 use crate::recover::ResponseHypothesis;
 use crate::transport::{CHANNELS, Decibels};
 
-/// Exponents are given to so many parts of one.
+/// Exponents are rounded to hundredths.
 const EXPONENT_PRECISION: f64 = 100.0;
 /// Logarithm of the exponent of a camera whose codes are proportional to light.
 const MAX_LINEAR_LOG_EXPONENT: f64 = 0.05;
@@ -62,7 +62,7 @@ impl EstimatedField {
             _ => ("display-response", "Measure the display's response"),
         };
         let ending = match self.is_used {
-            true => "the estimated value is used, as --trust estimated says".to_owned(),
+            true => "The estimated value is used, as --trust estimated says".to_owned(),
             false => format!(
                 "{remedy}, or declare {} or give --trust estimated",
                 self.member()
@@ -85,7 +85,9 @@ pub fn with_saturation(
     let declared = saturation;
     for codes in codes {
         for (own, found) in saturation.iter_mut().zip(codes.undeclared_saturation()) {
-            *own = found.map_or(*own, |code| own.min(f64::from(code)));
+            // A channel without light has all samples at black.
+            let found = found.map(f64::from).filter(|code| *code > camera.black);
+            *own = found.map_or(*own, |code| own.min(code));
         }
     }
     (saturation != declared).then(|| {
@@ -116,7 +118,11 @@ pub fn with_response(manifest: &Manifest, hypothesis: ResponseHypothesis) -> Man
     match hypothesis {
         ResponseHypothesis::Display { exponent } => match &mut light.gamma {
             Some(gamma) => *gamma = rounded(*gamma * exponent),
-            None => light.response = Some(powers(&manifest.light.emission(), exponent)),
+            None => {
+                for pair in light.response.iter_mut().flatten() {
+                    pair[1] = pair[1].powf(exponent);
+                }
+            }
         },
         ResponseHypothesis::Camera(response) => {
             amended.camera.response = composed(amended.camera.response, response);
@@ -162,7 +168,7 @@ pub fn response_reason(
 ) -> String {
     let what = match field.field {
         "camera.response" => "the photographs are not linear",
-        _ => "the display's response is another",
+        _ => "the display does not emit what is declared",
     };
     let rise = match declared {
         Some(declared) => {
@@ -175,14 +181,6 @@ pub fn response_reason(
     format!("{what}: with {}, {rise}", field.member())
 }
 
-/// Codes and emission to the power of `exponent`.
-fn powers(emission: &[f64], exponent: f64) -> Vec<[f64; 2]> {
-    let pairs = emission.iter().enumerate();
-    pairs
-        .map(|(code, e)| [code as f64, e.powf(exponent)])
-        .collect()
-}
-
 /// The response of a camera whose photographs, linearised by `declared`, are linear after `then`.
 fn composed(declared: CameraResponse, then: CameraResponse) -> CameraResponse {
     let exponent = match declared {
@@ -190,22 +188,73 @@ fn composed(declared: CameraResponse, then: CameraResponse) -> CameraResponse {
         CameraResponse::Gamma(exponent) => exponent,
         CameraResponse::Srgb => SRGB_EXPONENT,
     };
-    match then {
-        CameraResponse::Gamma(then)
-            if (exponent * then).ln().abs() < MAX_LINEAR_LOG_EXPONENT && exponent != 1.0 =>
+    match (declared, then) {
+        (CameraResponse::Linear, CameraResponse::Gamma(then)) => {
+            CameraResponse::Gamma(rounded(then))
+        }
+        (CameraResponse::Linear, then) => then,
+        (_, CameraResponse::Gamma(then))
+            if (exponent * then).ln().abs() < MAX_LINEAR_LOG_EXPONENT =>
         {
             CameraResponse::Linear
         }
-        CameraResponse::Gamma(then) => CameraResponse::Gamma(rounded(exponent * then)),
-        other => other,
+        (_, CameraResponse::Gamma(then)) => CameraResponse::Gamma(rounded(exponent * then)),
+        (_, CameraResponse::Srgb) => CameraResponse::Gamma(rounded(exponent * SRGB_EXPONENT)),
+        (declared, CameraResponse::Linear) => declared,
     }
 }
 
+/// To the precision of an estimate, within the range that a manifest allows.
 fn rounded(exponent: f64) -> f64 {
-    (exponent * EXPONENT_PRECISION).round() / EXPONENT_PRECISION
+    let rounded = (exponent * EXPONENT_PRECISION).round() / EXPONENT_PRECISION;
+    rounded.clamp(0.1, 10.0)
 }
 
 /// To a tenth of a percent.
 fn rounded_share(share: f64) -> f64 {
     (share * 1000.0).round() / 1000.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::ManifestLight;
+
+    #[test]
+    fn responses_of_the_camera_are_composed() {
+        use CameraResponse::{Gamma, Linear, Srgb};
+        for (declared, then, expected) in [
+            (Linear, Srgb, Srgb),
+            (Linear, Gamma(1.504), Gamma(1.5)),
+            (Gamma(1.5), Gamma(1.2), Gamma(1.8)),
+            (Gamma(2.0), Gamma(0.5), Linear),
+            (Gamma(0.5), Srgb, Gamma(1.1)),
+            (Srgb, Gamma(0.45), Linear),
+        ] {
+            assert_eq!(composed(declared, then), expected, "{declared:?} {then:?}");
+        }
+    }
+
+    #[test]
+    fn fields_are_named_as_in_the_manifest() {
+        let declared = Manifest {
+            light: ManifestLight::of_gamma(1.8),
+            ..Manifest::default()
+        };
+        let estimated = with_response(&declared, ResponseHypothesis::Display { exponent: 1.2222 });
+        let fields = changed_responses(&declared, &estimated);
+        assert_eq!(fields.len(), 1);
+        assert_eq!(fields[0].member(), r#""light": {"gamma": 2.2}"#);
+        let mut table = declared;
+        table.light = ManifestLight {
+            response: Some(vec![[0.0, 0.0], [128.0, 0.25], [255.0, 1.0]]),
+            ..ManifestLight::default()
+        };
+        let estimated = with_response(&table, ResponseHypothesis::Display { exponent: 2.0 });
+        let response = estimated.light.response.unwrap_or_default();
+        assert_eq!(response, [[0.0, 0.0], [128.0, 0.0625], [255.0, 1.0]]);
+        let (dimming, field) = with_dimming(&table, 0.1504);
+        assert_eq!(dimming.light.dimming, Some(0.15));
+        assert_eq!(field.member(), r#""light": {"dimming": 0.15}"#);
+    }
 }

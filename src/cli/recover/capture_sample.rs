@@ -3,13 +3,15 @@
 use anyhow::Result;
 
 use crate::calibrate::LightPlaneAxis;
-use crate::capture::{CaptureFolder, DarkFrame, Manifest, Measurements};
+use crate::capture::{CameraRowSet, CaptureFolder, DarkFrame, Manifest, Measurements};
 use crate::cli::measurement_reader::{
     MeasurementReader, ReadSample, read_patterns, read_sample_of,
 };
 use crate::cli::process_resources::InterruptibleCores;
 use crate::export::MemoryPlan;
 
+/// Camera rows from which the contrast of Gray code is measured.
+const MAX_CONTRAST_ROWS: u32 = 128;
 /// Axes of the light plane.
 const AXES: [LightPlaneAxis; 2] = [LightPlaneAxis::X, LightPlaneAxis::Y];
 
@@ -63,7 +65,11 @@ impl SampleSource<'_> {
     /// The contrast of the finest bits of the Gray code in the sharpest camera pixels, along the axis where it is lower.
     /// `None` if these photographs are missing, as nothing else needs them where the correspondence is declared.
     pub fn finest_contrast(&self, sample: &CaptureSample) -> Option<f32> {
-        let rows = self.plan.gray_code_rows(2);
+        // A few, as the photographs are in memory.
+        let height = sample.measurements.camera.height;
+        let step = height.div_ceil(MAX_CONTRAST_ROWS);
+        let rows = (0..height).step_by(step as usize).map(|y| y..y + 1);
+        let rows = CameraRowSet::from_strips(rows);
         let contrast = |axis| {
             let bit = sample.folder.read_finest_bit(&sample.dark, &rows, axis);
             bit.ok()?.best_contrast()
@@ -80,9 +86,14 @@ impl SampleSource<'_> {
         self.read(folder, shots, || Ok(()))
     }
 
-    /// Reads the photographs of other shots. Frees the memory of the others before.
-    pub fn read_shots(&self, sample: CaptureSample, shots: Vec<usize>) -> Result<CaptureSample> {
-        let folder = sample.folder.clone();
+    /// Reads the photographs of other shots by another manifest. Frees the memory of the others before.
+    pub fn read_shots(
+        &self,
+        sample: CaptureSample,
+        shots: Vec<usize>,
+        manifest: Manifest,
+    ) -> Result<CaptureSample> {
+        let folder = sample.folder.with_manifest(manifest);
         drop(sample);
         self.read(folder, shots, || Ok(()))
     }

@@ -93,7 +93,7 @@ impl RecoverJob<'_> {
         messages::note_hot_pixels(hot);
         findings.warn(messages::overexposure(overexposed));
         findings.check(self.args.strict)?;
-        let provenance = Provenance::new(folder.manifest(), &shots);
+        let provenance = Provenance::new(folder.manifest(), self.shots);
         let metadata = export::metadata(&provenance, method);
         let patterns = metadata.capture.patterns;
         let encode = || self.encode(recovery, checkpoint, metadata);

@@ -91,10 +91,10 @@ pub fn display_sharpness(contrast: f32) -> Option<Warning> {
     (contrast < MIN_FINEST_CONTRAST).then(|| Warning {
         code: "display-sharpness",
         message: format!(
-            "no camera pixel shows the finest stripes of the Gray code with more than {:.0} % contrast: either the object \
-             scatters light over several elements everywhere, or the display is blurred, which would be part of the light \
-             transport and which held-out photographs cannot reveal. Show patterns without smooth scaling, and photograph \
-             a bare part of the display",
+            "99 % of the bright camera pixels show the finest stripes of the Gray code with at most {:.0} % contrast: the object \
+             scatters light over several elements everywhere, camera pixels are larger than elements, or the display is \
+             blurred, which would be part of the light transport and which held-out photographs cannot reveal. Show patterns \
+             without smooth scaling, and photograph a bare part of the display",
             100.0 * contrast
         ),
     })
@@ -361,16 +361,14 @@ pub fn capture_fault(
     format!("{}: {text}", folder.manifest_path().display())
 }
 
-/// The warning of a camera that moved once, if only the photographs `still` are used.
+/// The warning of a camera that moved once, before photograph `first`, if only the photographs `still` are used. `shift` is
+/// the move in camera pixels, `None` for a fraction of a pixel.
 pub fn moved_once(
     folder: &CaptureFolder,
     shots: &[usize],
-    fault: CaptureFault,
+    (first, shift): (usize, Option<[i32; 2]>),
     still: &Range<usize>,
-) -> Option<Warning> {
-    let CaptureFault::Moved { first, shift } = fault else {
-        return None;
-    };
+) -> Warning {
     let shot = shots[first];
     let name = format!("shots[{shot}] ({})", folder.manifest().shots[shot].photo);
     let moved = shots.len() - still.len();
@@ -379,14 +377,17 @@ pub fn moved_once(
     } else {
         "before"
     };
-    Some(Warning {
+    let move_text = match shift {
+        Some(shift) => moved_before(&name, shift),
+        None => format!("the camera or the object moved before {name}, by a fraction of a pixel"),
+    };
+    Warning {
         code: MOVED_CODE,
         message: format!(
-            "{}: {}: the {moved} photographs {side} are left out",
+            "{}: {move_text}: the {moved} photographs {side} are left out",
             folder.manifest_path().display(),
-            moved_before(&name, shift),
         ),
-    })
+    }
 }
 
 /// That the camera moved before a shot.

@@ -13,7 +13,7 @@ use crate::export::{self, MIN_PLAUSIBLE_SNR, PreparedExport};
 use crate::recover::{
     CaptureFault, PreparedRecovery, RecoverError, WindowSizeEstimate, diagnose, find_response,
 };
-use crate::transport::{Decibels, Window};
+use crate::transport::{Correspondence, Decibels, Window};
 
 /// SNR on held-out patterns below which hardly anything in a file would be right.
 const MIN_USABLE_SNR: Decibels = Decibels(2.0);
@@ -23,6 +23,10 @@ const MIN_SNR_RISE: Decibels = Decibels(0.3);
 const MAX_TRIALS: usize = 3;
 /// Fewest photographs on one side of a move that are recovered alone.
 const MIN_STILL_PHOTOGRAPHS: usize = 24;
+
+/// Step of the shifts in camera pixels that is a move, and its square relative to the scatter on either side.
+const MIN_STEP: f64 = 0.1;
+const MIN_STEP_RATIO: f64 = 25.0;
 
 /// A recovery that is ready to run, with the photographs that it is prepared from.
 pub struct PreparedCapture {
@@ -63,6 +67,17 @@ impl Attempt {
         }
     }
 
+    /// The first photograph from which on shifts of the picture differ from those before: the camera moved by a fraction of
+    /// a pixel.
+    fn step_of_shifts(&self) -> Option<usize> {
+        let corrections = self.prepared.as_ref().ok()?.recovery.corrections();
+        let shifts: Vec<[f64; 2]> = corrections
+            .iter()
+            .map(|correction| correction.shift)
+            .collect();
+        first_after_step(&shifts)
+    }
+
     /// Indices of the photographs that are left out.
     fn left_out(&self) -> Vec<usize> {
         let recovery = self.prepared.as_ref().map(|prepared| &prepared.recovery);
@@ -84,8 +99,6 @@ impl CapturePreparation<'_> {
         findings.warn(messages::eight_bits(&sample.read.codes));
         let saturated = sample.read.codes.saturated;
         findings.warn(messages::saturation(saturated, &sample.measurements));
-        let contrast = self.source.finest_contrast(&sample);
-        findings.warn(contrast.and_then(messages::display_sharpness));
         let attempt = self.attempt(sample);
         let attempt = self.with_capture_fault(attempt, &mut findings)?;
         let attempt = self.with_response(attempt, &mut findings)?;
@@ -95,6 +108,8 @@ impl CapturePreparation<'_> {
             prepared,
             cause,
         } = attempt;
+        let contrast = self.source.finest_contrast(&sample);
+        findings.warn(contrast.and_then(messages::display_sharpness));
         let prepared = match (prepared, cause.clone()) {
             (Ok(prepared), _) => prepared,
             (Err(_), Some(cause)) => bail!(cause),
@@ -164,30 +179,31 @@ impl CapturePreparation<'_> {
                 cores,
             )?
         };
-        let Some(fault) = fault else {
-            return Ok(attempt);
+        let moved = match fault {
+            Some(CaptureFault::Moved { first, shift }) => Some((first, Some(shift))),
+            Some(_) => None,
+            None => attempt.step_of_shifts().map(|first| (first, None)),
         };
-        let still = match fault {
-            CaptureFault::Moved { first, .. } => still_photographs(sample.shots.len(), first),
-            _ => None,
-        };
-        let Some(still) = still else {
-            let cause =
-                messages::capture_fault(&sample.folder, &sample.shots, &sample.measurements, fault);
-            return Ok(Attempt {
-                cause: Some(cause),
-                ..attempt
+        let count = sample.shots.len();
+        let still = moved.and_then(|(first, _)| still_photographs(count, first));
+        let (Some((first, shift)), Some(still)) = (moved, still) else {
+            let cause = fault.map(|fault| {
+                messages::capture_fault(&sample.folder, &sample.shots, &sample.measurements, fault)
             });
+            return Ok(Attempt { cause, ..attempt });
         };
-        findings.warn(messages::moved_once(
-            &sample.folder,
-            &sample.shots,
-            fault,
-            &still,
-        ));
+        let mut manifest = sample.folder.manifest().clone();
+        if still.start > 0 {
+            // Gray code and flood are from the place before.
+            let correspondence = sample.measurements.correspondence;
+            manifest.correspondence = Some(shifted(correspondence, shift.unwrap_or_default()));
+            manifest.flood = None;
+        }
+        let warning = messages::moved_once(&sample.folder, &sample.shots, (first, shift), &still);
+        findings.warn([warning]);
         let (moved, shots) = partition(&sample.shots, &still);
         findings.moved_shots = moved;
-        let sample = self.source.read_shots(attempt.sample, shots)?;
+        let sample = self.source.read_shots(attempt.sample, shots, manifest)?;
         Ok(self.attempt(sample))
     }
 
@@ -254,17 +270,25 @@ impl CapturePreparation<'_> {
     fn likely_manifest(&self, attempt: &Attempt) -> Result<Option<Manifest>> {
         let (sample, cores) = (&attempt.sample, self.source.cores);
         let measurements = &sample.measurements;
-        let found = match &attempt.prepared {
-            Ok(prepared) => prepared.recovery.response(measurements, cores)?,
-            Err(_) => pollster::block_on(find_response(measurements, self.window(), cores))
-                .map_err(|error| self.recover_error(error, sample))?,
+        let _spinner = progress::spinner("testing responses");
+        let found = pollster::block_on(async {
+            match &attempt.prepared {
+                Ok(prepared) => prepared.recovery.response(measurements, cores).await,
+                Err(_) => find_response(measurements, self.window(), cores).await,
+            }
+        });
+        let found = match found {
+            Err(RecoverError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            // The recovery has told, or will tell, why nothing can be estimated.
+            found => found.ok().flatten(),
         };
         Ok(found.map(|found| calibration::with_response(sample.folder.manifest(), found)))
     }
 
     /// Looks whether the display dims bright pictures.
     fn with_dimming(&self, attempt: Attempt, findings: &mut Findings) -> Result<Attempt> {
-        let Ok(prepared) = &attempt.prepared else {
+        let Some(prepared) = (attempt.prepared.as_ref().ok()).filter(|_| !attempt.is_doubtful())
+        else {
             return Ok(attempt);
         };
         // A wrong response would seem to be dimming.
@@ -322,6 +346,43 @@ impl CapturePreparation<'_> {
     }
 }
 
+/// The place in a list of shifts after which they differ from those before by more than their scatter.
+fn first_after_step(shifts: &[[f64; 2]]) -> Option<usize> {
+    let mean = |part: &[[f64; 2]], axis: usize| {
+        part.iter().map(|shift| shift[axis]).sum::<f64>() / part.len() as f64
+    };
+    // Squared distance between the means of both parts, and mean squared deviation from them.
+    let split = |first: usize| {
+        let (before, after) = shifts.split_at(first);
+        let (mut step, mut scatter) = (0.0, 0.0);
+        for axis in 0..2 {
+            let means = [mean(before, axis), mean(after, axis)];
+            step += (means[1] - means[0]).powi(2);
+            for (part, mean) in [before, after].into_iter().zip(means) {
+                scatter += part
+                    .iter()
+                    .map(|shift| (shift[axis] - mean).powi(2))
+                    .sum::<f64>();
+            }
+        }
+        (first, step, scatter / shifts.len() as f64)
+    };
+    let splits =
+        (MIN_STILL_PHOTOGRAPHS / 4)..(shifts.len().saturating_sub(MIN_STILL_PHOTOGRAPHS / 4));
+    let best = splits.map(split).min_by(|a, b| a.2.total_cmp(&b.2))?;
+    let (first, step, scatter) = best;
+    let is_step = step > MIN_STEP * MIN_STEP && step > MIN_STEP_RATIO * scatter;
+    is_step.then_some(first)
+}
+
+/// The correspondence of a picture that is shifted by camera pixels to the right and down.
+fn shifted(correspondence: Correspondence, [dx, dy]: [i32; 2]) -> Correspondence {
+    let row = |[x, y, constant]: [f64; 3]| [x, y, constant - x * f64::from(dx) - y * f64::from(dy)];
+    Correspondence {
+        affine: correspondence.affine.map(row),
+    }
+}
+
 /// Which of `count` photographs show the object from the place of most, if the camera moved before photograph `first`: of
 /// equal numbers those before, as the Gray code. `None` if these are too few.
 fn still_photographs(count: usize, first: usize) -> Option<std::ops::Range<usize>> {
@@ -336,4 +397,45 @@ fn still_photographs(count: usize, first: usize) -> Option<std::ops::Range<usize
 fn partition(shots: &[usize], still: &std::ops::Range<usize>) -> (Vec<usize>, Vec<usize>) {
     let moved = [&shots[..still.start], &shots[still.end..]].concat();
     (moved, shots[still.clone()].to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::CameraPixel;
+
+    #[test]
+    fn a_step_of_shifts_is_found_and_trembling_is_none() {
+        let noise = |l: usize| 0.01 * (7.3 * l as f64).sin();
+        let step = |l: usize| if l < 40 { 0.0 } else { 0.2 };
+        let shifts: Vec<[f64; 2]> = (0..72)
+            .map(|l| [step(l) + noise(l), noise(l + 5)])
+            .collect();
+        assert_eq!(first_after_step(&shifts), Some(40));
+        let trembling: Vec<[f64; 2]> = (0..72)
+            .map(|l| [20.0 * noise(l), 20.0 * noise(l + 5)])
+            .collect();
+        assert_eq!(first_after_step(&trembling), None);
+        assert_eq!(first_after_step(&[]), None);
+    }
+
+    #[test]
+    fn the_larger_part_is_used_if_it_is_large_enough() {
+        assert_eq!(still_photographs(72, 36), Some(0..36));
+        assert_eq!(still_photographs(72, 20), Some(20..72));
+        assert_eq!(still_photographs(40, 20), None);
+        assert_eq!(partition(&[3, 5, 7, 9], &(1..4)), (vec![3], vec![5, 7, 9]));
+    }
+
+    #[test]
+    fn a_correspondence_follows_the_picture() {
+        let affine = [[0.5, 0.1, 3.0], [-0.2, 0.4, 1.0]];
+        let before = Correspondence { affine };
+        let after = shifted(before, [3, 1]);
+        let (old, new) = (
+            before.at(CameraPixel { x: 10, y: 10 }),
+            after.at(CameraPixel { x: 13, y: 11 }),
+        );
+        assert!((old.u - new.u).abs() < 1e-12 && (old.v - new.v).abs() < 1e-12);
+    }
 }

@@ -6,7 +6,7 @@
 //! are those before photometric correction, which would take part of a wrong response for exposure and stray light.
 
 use super::CalibratedMeasurements;
-use super::equations::for_largest_window;
+use super::equations::{MAX_PHOTOGRAPHS, for_largest_window};
 use super::window_covariance::{MODEL_VARIANCE, UNEXPLAINED_VARIANCE, WindowModel};
 use crate::capture::{CameraResponse, Measurements};
 use crate::job_executor::{Cancelled, Executor};
@@ -24,13 +24,14 @@ const LOG_STEP: f64 = 0.1;
 const MAX_LOG_EXPONENT: f64 = 1.25;
 /// Rounds of parabolic interpolation.
 const REFINEMENTS: usize = 5;
-/// Deviation of an exponent from 1 that does harm.
+/// Logarithm of the smallest exponent that is told.
 const MIN_LOG_EXPONENT: f64 = 0.01;
 /// Fall of the logarithm of the relative prediction error that is worth a trial, and the standard errors by which it must
 /// differ from zero.
 const MIN_IMPROVEMENT: f64 = 0.01;
 const MIN_SIGNIFICANCE: f64 = 4.0;
-/// The same by which a power must be better than the curve of sRGB, which is likelier: they are nearly the same.
+/// Fall of the same logarithm by which a power must explain the photographs better than the curve of sRGB, which is likelier
+/// and nearly equal.
 const MIN_POWER_ADVANTAGE: f64 = 0.1;
 
 /// A response that explains the photographs better than the declared one.
@@ -62,7 +63,7 @@ pub(in crate::recover) fn find(
     let squares = mean_function::sample_squares(measurements);
     let step = squares.len().div_ceil(MAX_SQUARES).max(1);
     let squares: Vec<TileRect> = squares.into_iter().step_by(step).collect();
-    if squares.len() < MIN_SQUARES || used.len() < MIN_PHOTOGRAPHS {
+    if squares.len() < MIN_SQUARES || !(MIN_PHOTOGRAPHS..=MAX_PHOTOGRAPHS).contains(&used.len()) {
         return Ok(None);
     }
     let search = ResponseSearch {
@@ -111,7 +112,9 @@ impl Scored {
         let mean = falls.iter().sum::<f64>() / count;
         let variance =
             falls.iter().map(|fall| (fall - mean).powi(2)).sum::<f64>() / (count * (count - 1.0));
-        mean > MIN_IMPROVEMENT && mean > MIN_SIGNIFICANCE * variance.sqrt()
+        falls.len() >= MIN_SQUARES
+            && mean > MIN_IMPROVEMENT
+            && mean > MIN_SIGNIFICANCE * variance.sqrt()
     }
 }
 
@@ -148,12 +151,15 @@ impl<E: Executor> ResponseSearch<'_, E> {
         Ok((is_far && best.is_better_than(&declared)).then_some(best.hypothesis))
     }
 
-    /// Whether a pattern has elements between black and white, so that the exponent of the display matters.
+    /// Whether a pattern has elements between its darkest and its brightest, so that the exponent of the display matters.
     fn has_grey_codes(&self) -> bool {
+        let is_grey = |plane: &[f32]| {
+            let darkest = plane.iter().copied().fold(f32::INFINITY, f32::min);
+            let brightest = plane.iter().copied().fold(0.0, f32::max);
+            plane.iter().any(|e| *e > darkest && *e < brightest)
+        };
         let mut patterns = self.measurements.patterns.iter();
-        patterns.any(|pattern| {
-            (0..CHANNELS).any(|c| pattern.plane(c).iter().any(|&e| e > 0.0 && e < 1.0))
-        })
+        patterns.any(|pattern| (0..CHANNELS).any(|c| is_grey(pattern.plane(c))))
     }
 
     /// The exponent with the lowest prediction errors: by steps as long as these fall, then by parabolas through the three
@@ -192,6 +198,7 @@ impl<E: Executor> ResponseSearch<'_, E> {
             if (minimum - b.0).abs() < 0.1 * MIN_LOG_EXPONENT {
                 break;
             }
+            self.executor.check_cancelled()?;
             let place = if minimum < b.0 { lowest } else { lowest + 1 };
             points.insert(place, at(minimum));
         }
