@@ -450,6 +450,74 @@ fn a_display_that_dims_bright_pictures_is_told() {
     assert!(trusting.status.success());
     let report: Value = serde_json::from_slice(&trusting.stdout).unwrap();
     assert_eq!(report["estimated_fields"][0]["is_used"], true);
+
+    // Declared, it is not found again.
+    let path = capture.path.join("capture.json");
+    let mut manifest: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    manifest["light"]["dimming"] = dimming.into();
+    std::fs::write(&path, manifest.to_string()).unwrap();
+    let (declared, errors) = capture.report();
+    assert_eq!(declared["warnings"], Value::Array(Vec::new()), "{errors}");
+}
+
+/// Simulates a capture, photographs it again with a fault, and recovers it: the report.
+fn report_of_fault(scene: &str, fault: &str, method: &str) -> Value {
+    let folder = TempDir::new().unwrap();
+    let [original, faulty, file] =
+        ["original", "faulty", "file.ltm"].map(|name| folder.path().join(name));
+    let path = |path: &PathBuf| path.to_str().unwrap().to_owned();
+    let [original, faulty, file] = [&original, &faulty, &file].map(path);
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
+        let output = command.args(arguments).output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{arguments:?}: {errors}");
+        output.stdout
+    };
+    let size = ["--camera", "48x48", "--light", "24x24", "--patterns", "50"];
+    run(&[&["simulate", scene, "-o", &original], &size[..]].concat());
+    run(&["photograph", &original, "-o", &faulty, "--fault", fault]);
+    let report = run(&[
+        "recover", &faulty, "-o", &file, "--json", "--method", method,
+    ]);
+    serde_json::from_slice(&report).unwrap()
+}
+
+#[test]
+fn a_gamma_that_is_declared_wrong_is_told() {
+    let field = |report: &Value| report["estimated_fields"][0].clone();
+    let report = report_of_fault("stained-glass", "gamma=1.6", "learned");
+    let codes: Vec<&Value> = report["warnings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|w| &w["code"])
+        .collect();
+    assert!(
+        codes.contains(&&Value::from("display-response")),
+        "{codes:?}"
+    );
+    assert_eq!(field(&report)["field"], "light.gamma");
+    assert_eq!(field(&report)["declared"], 1.6);
+    let gamma = number(&field(&report)["estimated"]);
+    assert!((gamma - 2.2).abs() < 0.1, "{gamma}");
+}
+
+#[test]
+fn patterns_that_are_enlarged_smoothly_are_warned_of() {
+    let codes = |report: &Value| report["warnings"].to_string();
+    let report = report_of_fault("cookies", "smooth=0.7", "nnls");
+    assert!(
+        codes(&report).contains("display-sharpness"),
+        "{}",
+        codes(&report)
+    );
+    let report = report_of_fault("cookies", "jitter=0.01", "nnls");
+    assert!(
+        !codes(&report).contains("display-sharpness"),
+        "{}",
+        codes(&report)
+    );
 }
 
 #[test]

@@ -448,6 +448,73 @@ mod tests {
     }
 
     #[test]
+    fn camera_responses_are_read_and_undone() {
+        let camera = |response: serde_json::Value| {
+            manifest(|j| j["camera"]["response"] = response.clone()).map(|m| m.camera)
+        };
+        let linear = manifest(|_| {}).unwrap().camera;
+        let srgb = camera("srgb".into()).unwrap();
+        let gamma = camera(serde_json::json!({"gamma": 2.0})).unwrap();
+        assert_eq!(srgb.response, CameraResponse::Srgb);
+        let code = (512.0 + 0.5 * 59_488.0) as u16;
+        for (camera, expected) in [(&linear, 0.5), (&srgb, 0.214_04), (&gamma, 0.25)] {
+            assert!(
+                (camera.linear(code, 1.0) - expected).abs() < 1e-4,
+                "{camera:?}"
+            );
+            assert!((camera.linear(60_000, 2.0) - 0.5).abs() < 1e-6);
+            assert!(camera.linear(0, 1.0) <= 0.0);
+        }
+        assert!(
+            serde_json::to_string(&srgb)
+                .unwrap()
+                .contains(r#""response":"srgb""#)
+        );
+        assert!(!serde_json::to_string(&linear).unwrap().contains("response"));
+        let error = camera(serde_json::json!({"gamma": 0})).unwrap_err();
+        assert!(
+            error.to_string().contains("\"camera.response.gamma\""),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn saturation_and_dimming_are_checked_and_applied() {
+        let camera =
+            manifest(|j| j["camera"]["saturation"] = serde_json::json!([9000, 8000, 60_000]));
+        let camera = camera.unwrap().camera;
+        assert!(camera.is_saturated(9000, 0) && !camera.is_saturated(8999, 0));
+        assert!(camera.is_saturated(8000, 1) && !camera.is_saturated(59_999, 2));
+        for (object, field, value, name) in [
+            (
+                "camera",
+                "saturation",
+                serde_json::json!([512, 600, 600]),
+                "\"camera.saturation[0]\"",
+            ),
+            (
+                "light",
+                "dimming",
+                serde_json::json!(0.95),
+                "\"light.dimming\"",
+            ),
+        ] {
+            let error = manifest(|j| j[object][field] = value.clone()).unwrap_err();
+            assert!(error.to_string().contains(name), "{error}");
+        }
+        let light = manifest(|j| j["light"]["dimming"] = 0.2.into())
+            .unwrap()
+            .light;
+        let mut grey = Pattern::Grey(vec![1.0, 0.0]);
+        light.dim(&mut grey);
+        assert_eq!(grey, Pattern::Grey(vec![0.9, 0.0]));
+        // The mean is that of all channels.
+        let mut red = Pattern::Rgb([vec![1.0, 1.0], vec![0.5, 0.0], vec![0.0, 0.5]]);
+        light.dim(&mut red);
+        assert_eq!(red.plane(0), [0.9, 0.9]);
+    }
+
+    #[test]
     fn response_table_is_interpolated_and_gamma_is_a_power() {
         // In cd/m² or relative to the maximum.
         for full in [1.0, 350.0] {

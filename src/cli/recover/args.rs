@@ -48,7 +48,7 @@ pub struct RecoverArgs {
     /// Limit on memory; photographs that do not fit are read in strips
     #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
     pub memory: ByteCount,
-    /// What to believe where the photographs contradict the responses in capture.json
+    /// Which responses of display and camera to use where the photographs contradict capture.json
     #[arg(long, value_enum, default_value_t = TrustedCalibration::Declared)]
     pub trust: TrustedCalibration,
     /// Continue an interrupted recovery from FILE.ltm.checkpoint
@@ -126,7 +126,7 @@ impl MethodName {
     }
 }
 
-/// What counts where photographs and manifest differ.
+/// Which responses are used where the photographs contradict `capture.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TrustedCalibration {
     /// capture.json; differences are warnings

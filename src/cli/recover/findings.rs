@@ -32,6 +32,11 @@ impl Findings {
         }
     }
 
+    /// Whether the photographs contradict no response that they are recovered with.
+    pub fn are_responses_right(&self) -> bool {
+        self.estimated_fields.iter().all(|field| field.is_used)
+    }
+
     /// Warns of a field that the photographs contradict, or notes that the estimate is used.
     pub fn add_estimate(&mut self, field: EstimatedField, warning: Warning) {
         match field.is_used {

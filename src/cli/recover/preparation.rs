@@ -7,7 +7,7 @@ use super::calibration;
 use super::capture_sample::{CaptureSample, SampleSource};
 use super::findings::Findings;
 use super::messages::{self, UnusableError};
-use crate::capture::{CaptureFolder, CodeStatistics, Manifest};
+use crate::capture::{CameraResponse, CaptureFolder, CodeStatistics, Manifest};
 use crate::cli::progress;
 use crate::export::{self, MIN_PLAUSIBLE_SNR, PreparedExport};
 use crate::recover::{
@@ -108,8 +108,11 @@ impl CapturePreparation<'_> {
             prepared,
             cause,
         } = attempt;
-        let contrast = self.source.finest_contrast(&sample);
-        findings.warn(contrast.and_then(messages::display_sharpness));
+        // Codes that are not linear have less contrast.
+        if findings.are_responses_right() {
+            let contrast = self.source.finest_contrast(&sample);
+            findings.warn(contrast.and_then(messages::display_sharpness));
+        }
         let prepared = match (prepared, cause.clone()) {
             (Ok(prepared), _) => prepared,
             (Err(_), Some(cause)) => bail!(cause),
@@ -236,8 +239,12 @@ impl CapturePreparation<'_> {
                 sample = trial.sample;
                 break;
             };
+            // A power that is a little better than the curve of sRGB is hardly likelier.
+            let next = match manifest.camera.response {
+                CameraResponse::Srgb => None,
+                _ => self.likely_manifest(&trial)?,
+            };
             best = Some((manifest, snr));
-            let next = self.likely_manifest(&trial)?;
             sample = trial.sample;
             match next {
                 Some(next) => manifest = next,
@@ -292,11 +299,10 @@ impl CapturePreparation<'_> {
             return Ok(attempt);
         };
         // A wrong response would seem to be dimming.
-        let is_linear = findings.estimated_fields.iter().all(|field| field.is_used);
         let dimming = prepared
             .recovery
             .dimming(&attempt.sample.measurements, self.source.cores);
-        let Some(dimming) = dimming.filter(|_| is_linear) else {
+        let Some(dimming) = dimming.filter(|_| findings.are_responses_right()) else {
             return Ok(attempt);
         };
         let manifest = attempt.sample.folder.manifest();

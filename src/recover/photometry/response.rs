@@ -32,7 +32,7 @@ const MIN_IMPROVEMENT: f64 = 0.01;
 const MIN_SIGNIFICANCE: f64 = 4.0;
 /// Fall of the same logarithm by which a power must explain the photographs better than the curve of sRGB, which is likelier
 /// and nearly equal.
-const MIN_POWER_ADVANTAGE: f64 = 0.1;
+const MIN_POWER_ADVANTAGE: f64 = 0.3;
 
 /// A response that explains the photographs better than the declared one.
 #[derive(Clone, Copy, Debug, PartialEq)]
