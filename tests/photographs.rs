@@ -411,7 +411,7 @@ fn a_tone_curve_is_told_and_undone_if_estimates_are_trusted() {
     let errors = String::from_utf8(output.stderr).unwrap();
     let text = r#""camera": {"response": "srgb"}"#;
     assert!(errors.contains(text), "{errors}");
-    let trusting = capture.recover(&["--trust", "estimated", "--strict"]);
+    let trusting = capture.recover(&["--trust", "estimated"]);
     let errors = String::from_utf8(trusting.stderr).unwrap();
     assert!(trusting.status.success(), "{errors}");
     let report: Value = serde_json::from_slice(&trusting.stdout).unwrap();
@@ -506,7 +506,7 @@ fn a_gamma_that_is_declared_wrong_is_told() {
 #[test]
 fn patterns_that_are_enlarged_smoothly_are_warned_of() {
     let codes = |report: &Value| report["warnings"].to_string();
-    let report = report_of_fault("cookies", "smooth=0.7", "nnls");
+    let report = report_of_fault("cookies", "smooth=0.5", "nnls");
     assert!(
         codes(&report).contains("display-sharpness"),
         "{}",

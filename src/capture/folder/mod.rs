@@ -166,17 +166,18 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         })
     }
 
-    /// Reads `rows` of the photographs of bit 0 of an axis.
+    /// Reads `rows` of the photographs of one bit of an axis.
     ///
     /// # Errors
     /// Those of [`read_gray_code`](Self::read_gray_code).
-    pub fn read_finest_bit(
+    pub fn read_gray_code_bit(
         &self,
         dark: &DarkFrame,
         rows: &CameraRowSet,
         axis: LightPlaneAxis,
+        bit: u32,
     ) -> Result<BitPair, CaptureError> {
-        let photo = |inverted| self.read_gray_code_photo(dark, rows, (axis, 0, inverted));
+        let photo = |inverted| self.read_gray_code_photo(dark, rows, (axis, bit, inverted));
         Ok(BitPair {
             plain: photo(false)?,
             inverted: photo(true)?,

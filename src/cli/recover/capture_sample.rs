@@ -62,20 +62,23 @@ impl SampleSource<'_> {
         })
     }
 
-    /// The contrast of the finest bits of the Gray code in the sharpest camera pixels, along the axis where it is lower.
+    /// The contrasts of bits 0 and 1 of the Gray code in the sharpest camera pixels, each along the axis where it is lower.
     /// `None` if these photographs are missing, as nothing else needs them where the correspondence is declared.
-    pub fn finest_contrast(&self, sample: &CaptureSample) -> Option<f32> {
+    pub fn finest_contrasts(&self, sample: &CaptureSample) -> Option<[f32; 2]> {
         // A few, as the photographs are in memory.
         let height = sample.measurements.camera.height;
         let step = height.div_ceil(MAX_CONTRAST_ROWS);
         let rows = (0..height).step_by(step as usize).map(|y| y..y + 1);
         let rows = CameraRowSet::from_strips(rows);
-        let contrast = |axis| {
-            let bit = sample.folder.read_finest_bit(&sample.dark, &rows, axis);
-            bit.ok()?.best_contrast()
+        let contrast = |axis, bit| {
+            let photos = (sample.folder).read_gray_code_bit(&sample.dark, &rows, axis, bit);
+            photos.ok()?.best_contrast()
         };
-        let [x, y] = AXES.map(contrast);
-        Some(x?.min(y?))
+        let lower = |bit| {
+            let [x, y] = AXES.map(|axis| contrast(axis, bit));
+            Some(x?.min(y?))
+        };
+        Some([lower(0)?, lower(1)?])
     }
 
     /// Reads the same photographs by another manifest. Frees their memory before.

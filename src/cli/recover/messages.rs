@@ -24,6 +24,10 @@ const MIN_NAMED_DEVIATION: f64 = 0.1;
 /// Contrast of the finest stripes of the Gray code in the sharpest pixels that shows a sharp display. Without any scattering,
 /// a blur of 0.5 light elements (standard deviation) leaves 0.79, and one of 0.57 leaves 0.7.
 const MIN_FINEST_CONTRAST: f32 = 0.7;
+/// Contrast of the finest stripes below which, and of stripes of twice their width above which, the display is blurred: an
+/// object that lowers the former by scattering lowers the latter, too.
+const MAX_BLURRED_CONTRAST: f32 = 0.9;
+const MIN_SHARP_CONTRAST: f32 = 0.97;
 /// Maximum number of shots or fields that a message names.
 const MAX_NAMED_ITEMS: usize = 4;
 
@@ -86,16 +90,28 @@ pub fn eight_bits(codes: &CodeStatistics) -> Option<Warning> {
     })
 }
 
-/// Warns if nothing shows that the display is sharp; `contrast` is that of the finest bits of the Gray code.
-pub fn display_sharpness(contrast: f32) -> Option<Warning> {
-    (contrast < MIN_FINEST_CONTRAST).then(|| Warning {
+/// Warns of a display that is blurred, or that may be; the contrasts are those of bits 0 and 1 of the Gray code.
+pub fn display_sharpness([finest, next]: [f32; 2]) -> Option<Warning> {
+    let percent = 100.0 * finest;
+    let reason = if finest < MAX_BLURRED_CONTRAST && next > MIN_SHARP_CONTRAST {
+        // Light that an object scatters reaches further.
+        format!(
+            "with {percent:.0} % contrast and wider stripes nearly fully: the display is blurred by part of an element"
+        )
+    } else if finest < MIN_FINEST_CONTRAST {
+        format!(
+            "with at most {percent:.0} % contrast: the object scatters light over several elements everywhere, camera \
+             pixels are larger than elements, or the display is blurred"
+        )
+    } else {
+        return None;
+    };
+    Some(Warning {
         code: "display-sharpness",
         message: format!(
-            "99 % of the bright camera pixels show the finest stripes of the Gray code with at most {:.0} % contrast: the object \
-             scatters light over several elements everywhere, camera pixels are larger than elements, or the display is \
-             blurred, which would be part of the light transport and which held-out photographs cannot reveal. Show patterns \
-             without smooth scaling, and photograph a bare part of the display",
-            100.0 * contrast
+            "99 % of the bright camera pixels show the finest stripes of the Gray code {reason}. A blur of the display would \
+             be part of the light transport, and held-out photographs cannot reveal it. Show patterns without smooth \
+             scaling, and photograph a bare part of the display"
         ),
     })
 }

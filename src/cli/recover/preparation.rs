@@ -110,8 +110,8 @@ impl CapturePreparation<'_> {
         } = attempt;
         // Codes that are not linear have less contrast.
         if findings.are_responses_right() {
-            let contrast = self.source.finest_contrast(&sample);
-            findings.warn(contrast.and_then(messages::display_sharpness));
+            let contrasts = self.source.finest_contrasts(&sample);
+            findings.warn(contrasts.and_then(messages::display_sharpness));
         }
         let prepared = match (prepared, cause.clone()) {
             (Ok(prepared), _) => prepared,
