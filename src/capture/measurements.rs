@@ -27,6 +27,17 @@ impl Pattern {
         }
     }
 
+    /// Whether elements lie between the darkest and the brightest of a plane, so that their emission depends on the
+    /// display's exponent.
+    pub fn has_grey_levels(&self) -> bool {
+        (0..CHANNELS).any(|c| {
+            let plane = self.plane(c);
+            let darkest = plane.iter().copied().fold(f32::INFINITY, f32::min);
+            let brightest = plane.iter().copied().fold(0.0, f32::max);
+            plane.iter().any(|e| *e > darkest && *e < brightest)
+        })
+    }
+
     /// The emission that each camera channel responds to, `[M, 3]`.
     pub fn rgb(&self) -> Vec<f32> {
         let element = |m| [0, 1, 2].map(|c| self.plane(c)[m]);

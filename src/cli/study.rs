@@ -11,7 +11,7 @@ use super::output_folder;
 use super::process_resources::AllCoresExecutor;
 use super::recover::MethodName;
 use super::study_faults::FaultStudy;
-use super::value_parsers::UsageError;
+use super::value_parsers::{UsageError, value_name};
 use crate::capture::{CameraRowSet, CaptureFolder, Measurements};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, SimulatedCapture, SimulatedScene, WINDOW_SIDE, first_shots};
@@ -91,7 +91,7 @@ pub fn run(args: &StudyArgs) -> Result<()> {
                 other => format!(" --pixels {other}"),
             };
             if let Some(method) = subject.fault_method {
-                option += &format!(" --faults --method {}", method.name());
+                option += &format!(" --faults --method {}", value_name(method));
             }
             let name = &subject.name;
             text += &format!("\nFrom `ltm-export study {name} -o DIR{option}`:\n");

@@ -15,11 +15,12 @@ use tempfile::TempDir;
 
 use super::process_resources::InterruptibleCores;
 use super::recover::{MethodName, RecoverReport, TrustedCalibration};
+use super::value_parsers::value_name;
 use super::{evaluate, photograph, recover, simulate};
 use crate::capture::{CaptureFolder, MANIFEST_NAME};
 use crate::simulate::{SessionFault, SessionFaultKind};
 use crate::study::{FaultOutcome, FaultedCapture, ProgressLog, ReportSection, fault_table};
-use crate::transport::{CHANNELS, Decibels};
+use crate::transport::Decibels;
 
 /// Built-in scenes.
 const SCENES: [&str; 2] = ["stained-glass", "cookies"];
@@ -206,8 +207,8 @@ impl<'a> FaultStudy<'a> {
         let folder = CaptureFolder::open(capture)?;
         let mut arguments: Vec<OsString> = vec![capture.into(), "-o".into()];
         arguments.extend([file.into(), "--lossless".into()]);
-        arguments.push(format!("--method={}", self.method.name()).into());
-        arguments.push(format!("--trust={}", trust.name()).into());
+        arguments.push(format!("--method={}", value_name(self.method)).into());
+        arguments.push(format!("--trust={}", value_name(trust)).into());
         let report = match recover::recover(&parse(arguments)?, &folder, &self.cores) {
             Ok(report) => report,
             // Not the fault's doing.
@@ -263,8 +264,7 @@ fn parse<T: Args>(arguments: impl IntoIterator<Item = impl Into<OsString> + Clon
 fn has_grey_codes(folder: &CaptureFolder) -> Result<bool> {
     for shot in 0..folder.manifest().shots.len() {
         let pattern = folder.read_pattern(shot)?;
-        let is_grey = |emission: &f32| *emission > 0.0 && *emission < 1.0;
-        if (0..CHANNELS).any(|c| pattern.plane(c).iter().any(is_grey)) {
+        if pattern.has_grey_levels() {
             return Ok(true);
         }
     }

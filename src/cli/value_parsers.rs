@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use clap::ValueEnum;
+
 /// A wrong combination of options that are valid on their own.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
@@ -13,6 +15,12 @@ pub fn parse_number(text: &str, min: f32, max: f32) -> Result<f32, String> {
         Ok(number) if (min..=max).contains(&number) => Ok(number),
         _ => Err(format!("it must be a number from {min} to {max}")),
     }
+}
+
+/// The name of an option's value, as on the command line.
+pub fn value_name(value: impl ValueEnum) -> String {
+    let value = value.to_possible_value();
+    value.map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 /// A number of bytes.

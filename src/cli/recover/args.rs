@@ -118,14 +118,6 @@ pub enum MethodName {
     Bpdn,
 }
 
-impl MethodName {
-    /// As on the command line.
-    pub fn name(self) -> String {
-        let value = self.to_possible_value();
-        value.map_or_else(String::new, |value| value.get_name().to_owned())
-    }
-}
-
 /// Which responses are used where the photographs contradict `capture.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TrustedCalibration {
@@ -133,16 +125,6 @@ pub enum TrustedCalibration {
     Declared,
     /// Responses of display and camera as the photographs show them
     Estimated,
-}
-
-impl TrustedCalibration {
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Declared => "declared",
-            Self::Estimated => "estimated",
-        }
-    }
 }
 
 #[cfg(test)]

@@ -81,8 +81,11 @@ impl SampleSource<'_> {
         Some([lower(0)?, lower(1)?])
     }
 
-    /// Reads the same photographs by another manifest. Frees their memory before.
+    /// Reads the same photographs by another manifest, unless they were read by it. Frees their memory before.
     pub fn read_by(&self, sample: CaptureSample, manifest: Manifest) -> Result<CaptureSample> {
+        if *sample.folder.manifest() == manifest {
+            return Ok(sample);
+        }
         let folder = sample.folder.with_manifest(manifest);
         let shots = sample.shots.clone();
         drop(sample);

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::args::RecoverArgs;
 use crate::capture::CaptureFolder;
 use crate::cli::process_resources::{Interrupted, InterruptibleCores};
+use crate::cli::value_parsers::value_name;
 use crate::export::MemoryPlan;
 use crate::job_executor::Executor;
 use crate::recover::{HoldoutValidation, PreparedRecovery};
@@ -68,7 +69,7 @@ impl CheckpointKey {
             basis: method.basis().map(|basis| basis.name().to_owned()),
             window: args.window.map(Window::side),
             patterns: args.patterns,
-            trust: args.trust.name().to_owned(),
+            trust: value_name(args.trust),
             memory_bytes: (!(plan.fits_photographs() && fits)).then_some(args.memory.0),
             files: files.collect::<Result<_>>()?,
             tiles: plan.tiles(),

@@ -227,32 +227,31 @@ impl CapturePreparation<'_> {
             prepared,
             cause,
         } = declared;
-        let mut best: Option<(Manifest, Decibels)> = None;
+        let mut best: Option<(Manifest, Decibels, PreparedExport)> = None;
         for _ in 0..MAX_TRIALS {
             let trial = self.attempt(self.source.read_by(sample, manifest.clone())?);
             let least = match (&best, declared_snr) {
-                (Some((_, snr)), _) => snr.0,
+                (Some((_, snr, _)), _) => snr.0,
                 (None, Some(snr)) => snr.0 + MIN_SNR_RISE.0,
                 (None, None) => MIN_PLAUSIBLE_SNR.0,
             };
-            let Some(snr) = trial.snr().filter(|snr| snr.0 > least) else {
-                sample = trial.sample;
-                break;
-            };
+            let better = trial.snr().filter(|snr| snr.0 > least);
             // A power that is a little better than the curve of sRGB is hardly likelier.
-            let next = match manifest.camera.response {
-                CameraResponse::Srgb => None,
+            let next = match (better, manifest.camera.response) {
+                (None, _) | (_, CameraResponse::Srgb) => None,
                 _ => self.likely_manifest(&trial)?,
             };
-            best = Some((manifest, snr));
             sample = trial.sample;
+            if let (Some(snr), Ok(prepared)) = (better, trial.prepared) {
+                best = Some((manifest, snr, prepared));
+            }
             match next {
                 Some(next) => manifest = next,
                 None => break,
             }
         }
         let is_used = best.is_some() && self.args.trust == TrustedCalibration::Estimated;
-        if let Some((estimated, snr)) = &best {
+        if let Some((estimated, snr, _)) = &best {
             for mut field in calibration::changed_responses(&original, estimated) {
                 field.is_used = is_used;
                 let reason = calibration::response_reason(&field, declared_snr, *snr);
@@ -264,7 +263,11 @@ impl CapturePreparation<'_> {
             }
         }
         match best.filter(|_| is_used) {
-            Some((estimated, _)) => Ok(self.attempt(self.source.read_by(sample, estimated)?)),
+            Some((estimated, _, prepared)) => Ok(Attempt {
+                sample: self.source.read_by(sample, estimated)?,
+                prepared: Ok(prepared),
+                cause: None,
+            }),
             None => Ok(Attempt {
                 sample: self.source.read_by(sample, original)?,
                 prepared,
@@ -299,10 +302,11 @@ impl CapturePreparation<'_> {
             return Ok(attempt);
         };
         // A wrong response would seem to be dimming.
-        let dimming = prepared
-            .recovery
-            .dimming(&attempt.sample.measurements, self.source.cores);
-        let Some(dimming) = dimming.filter(|_| findings.are_responses_right()) else {
+        if !findings.are_responses_right() {
+            return Ok(attempt);
+        }
+        let measurements = &attempt.sample.measurements;
+        let Some(dimming) = prepared.recovery.dimming(measurements, self.source.cores) else {
             return Ok(attempt);
         };
         let manifest = attempt.sample.folder.manifest();

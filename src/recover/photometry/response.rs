@@ -8,11 +8,11 @@
 use super::CalibratedMeasurements;
 use super::equations::{MAX_PHOTOGRAPHS, for_largest_window};
 use super::window_covariance::{MODEL_VARIANCE, UNEXPLAINED_VARIANCE, WindowModel};
-use crate::capture::{CameraResponse, Measurements};
+use crate::capture::{CameraResponse, Measurements, Pattern};
 use crate::job_executor::{Cancelled, Executor};
 use crate::linalg::{self, vectorise};
 use crate::recover::{mean_function, sampling};
-use crate::transport::{CHANNELS, Geometry, LightElement, TileRect};
+use crate::transport::{Geometry, LightElement, TileRect};
 
 /// Squares of the picture that are compared.
 const MAX_SQUARES: usize = 64;
@@ -132,7 +132,8 @@ impl<E: Executor> ResponseSearch<'_, E> {
                 candidates[0] = srgb;
             }
         }
-        if self.has_grey_codes() {
+        let patterns = &self.measurements.patterns;
+        if patterns.iter().any(Pattern::has_grey_levels) {
             let display = |exponent| Hypothesis::Display { exponent };
             candidates.push(self.best_exponent(&declared, display)?);
         }
@@ -149,17 +150,6 @@ impl<E: Executor> ResponseSearch<'_, E> {
             _ => true,
         };
         Ok((is_far && best.is_better_than(&declared)).then_some(best.hypothesis))
-    }
-
-    /// Whether a pattern has elements between its darkest and its brightest, so that the exponent of the display matters.
-    fn has_grey_codes(&self) -> bool {
-        let is_grey = |plane: &[f32]| {
-            let darkest = plane.iter().copied().fold(f32::INFINITY, f32::min);
-            let brightest = plane.iter().copied().fold(0.0, f32::max);
-            plane.iter().any(|e| *e > darkest && *e < brightest)
-        };
-        let mut patterns = self.measurements.patterns.iter();
-        patterns.any(|pattern| (0..CHANNELS).any(|c| is_grey(pattern.plane(c))))
     }
 
     /// The exponent with the lowest prediction errors: by steps as long as these fall, then by parabolas through the three
@@ -334,9 +324,9 @@ fn parabola_minimum((xa, ya): (f64, f64), (xb, yb): (f64, f64), (xc, yc): (f64, 
 #[cfg(all(test, not(target_arch = "wasm32")))]
 mod tests {
     use super::*;
-    use crate::capture::Pattern;
     use crate::job_executor::SequentialExecutor;
     use crate::recover::{find_response, test_problems::SyntheticCapture};
+    use crate::relight::srgb::srgb_encode;
 
     const PATTERNS: usize = 40;
 
@@ -404,10 +394,7 @@ mod tests {
             );
         }
         let found = response(|measurements| {
-            change_samples(measurements, |y| match y {
-                y if y <= 0.003_130_8 => 12.92 * y,
-                y => 1.055 * y.powf(1.0 / 2.4) - 0.055,
-            });
+            change_samples(measurements, |y| srgb_encode(f64::from(y)) as f32);
         });
         assert_eq!(
             found,
