@@ -45,9 +45,9 @@ fn with_little_memory_photographs_are_read_in_strips_with_the_same_result() {
     let folder = TempDir::new().unwrap();
     let size = [
         "--camera",
-        "64x1024",
+        "64x512",
         "--light",
-        "16x256",
+        "16x128",
         "--patterns",
         "100",
     ];
