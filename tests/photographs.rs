@@ -6,6 +6,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
+use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use image::{ImageBuffer, Rgb};
@@ -95,17 +96,21 @@ impl Capture {
     }
 }
 
+/// The report of the capture as it is.
+static CLEAN: LazyLock<Value> = LazyLock::new(|| {
+    let (report, errors) = Capture::new().report();
+    assert_eq!(report["warnings"], Value::Array(Vec::new()));
+    assert!(!errors.contains("note:"), "{errors}");
+    report
+});
+
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
 #[test]
 fn exposures_and_stray_light_are_corrected_and_reported() {
-    let clean = Capture::new();
-    let (clean, errors) = clean.report();
-    assert_eq!(clean["warnings"], Value::Array(Vec::new()));
-    assert!(!errors.contains("note:"), "{errors}");
-    let table = clean["photograph_table"].as_array().unwrap();
+    let table = CLEAN["photograph_table"].as_array().unwrap();
     assert!(
         table
             .iter()
@@ -134,7 +139,7 @@ fn exposures_and_stray_light_are_corrected_and_reported() {
     for ratio in &ratios {
         assert!((ratio / mean - 1.0).abs() < 0.006, "{ratio} of {mean}");
     }
-    let loss = number(&clean["expected_snr_db"]) - number(&report["expected_snr_db"]);
+    let loss = number(&CLEAN["expected_snr_db"]) - number(&report["expected_snr_db"]);
     assert!(loss.abs() < 1.0, "{loss} dB");
 }
 
@@ -336,22 +341,27 @@ fn a_camera_that_trembles_is_followed_and_warned_of() {
 }
 
 #[test]
-fn hot_pixels_are_filled() {
-    let clean = Capture::new().report().0;
+fn hot_and_dead_pixels_are_filled() {
     let capture = Capture::new();
     let hot = [(10, 20), (40, 33), (63, 5)].map(|(x, y)| 64 * y + x);
+    let dead = 64 * 30 + 22;
     for l in 0..60 {
         capture.change(l, |i, y| match i / 3 {
             n if hot.contains(&n) => 1.05,
+            n if n == dead => 0.0,
             _ => y,
         });
     }
     let (report, errors) = capture.report();
     assert!(errors.contains("3 hot pixels are filled"), "{errors}");
-    assert_eq!(report["hot_pixels"], 3);
+    assert!(errors.contains("1 dead pixel is filled"), "{errors}");
+    assert_eq!(
+        (&report["hot_pixels"], &report["dead_pixels"]),
+        (&Value::from(3), &Value::from(1))
+    );
     assert_eq!(report["overexposed_pixels"], 0);
-    assert_eq!(clean["hot_pixels"], 0);
-    let loss = number(&clean["expected_snr_db"]) - number(&report["expected_snr_db"]);
+    assert_eq!(CLEAN["hot_pixels"], 0);
+    let loss = number(&CLEAN["expected_snr_db"]) - number(&report["expected_snr_db"]);
     assert!(loss.abs() < 0.5, "{loss} dB");
 }
 
@@ -398,7 +408,6 @@ fn codes_that_are_declared_wrong_are_warned_of() {
 
 #[test]
 fn a_tone_curve_is_told_and_undone_if_estimates_are_trusted() {
-    let clean = Capture::new().report().0;
     let capture = Capture::new();
     let curve = |_, y: f64| match y {
         y if y <= 0.003_130_8 => 12.92 * y,
@@ -418,7 +427,7 @@ fn a_tone_curve_is_told_and_undone_if_estimates_are_trusted() {
     let field = &report["estimated_fields"][0];
     assert_eq!(field["field"], "camera.response");
     assert_eq!(field["estimated"], "srgb");
-    let loss = number(&clean["expected_snr_db"]) - number(&report["expected_snr_db"]);
+    let loss = number(&CLEAN["expected_snr_db"]) - number(&report["expected_snr_db"]);
     assert!(loss.abs() < 1.0, "{loss} dB");
 
     // Declared, it is no doubt.
@@ -517,6 +526,31 @@ fn patterns_that_are_enlarged_smoothly_are_warned_of() {
         !codes(&report).contains("display-sharpness"),
         "{}",
         codes(&report)
+    );
+}
+
+#[test]
+fn a_light_that_flickers_is_told() {
+    let capture = Capture::new();
+    for l in 0..60 {
+        // Three periods from the top to the bottom, at another time in each photograph.
+        let phase = (0.618_034 * l as f64).fract();
+        capture.change(l, |i, y| {
+            let periods = 3.0 * (i / 192) as f64 / 64.0 + phase;
+            y * (1.0 + 0.01 * (std::f64::consts::TAU * periods).sin())
+        });
+    }
+    let (report, errors) = capture.report();
+    let warnings = report["warnings"].as_array().unwrap();
+    assert!(
+        warnings
+            .iter()
+            .any(|warning| warning["code"] == "light-flickers"),
+        "{errors}"
+    );
+    assert!(
+        errors.contains("the exposure of rows varies by about 1.0 %"),
+        "{errors}"
     );
 }
 

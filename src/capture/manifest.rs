@@ -101,6 +101,9 @@ pub enum CameraResponse {
     Srgb,
     /// Light is the code, as a share of white, to this power.
     Gamma(f64),
+    /// With compressed highlights: light is `c / (s − (s − 1) c)` at the code `c`, as a share of white. The code rises `s`
+    /// times as fast as without compression at black, and `1 / s` times as fast at white.
+    Compression(f64),
 }
 
 impl CameraResponse {
@@ -114,6 +117,7 @@ impl CameraResponse {
             Self::Srgb => power((code + 0.055) / 1.055, 2.4),
             Self::Gamma(_) if code <= 0.0 => 0.0,
             Self::Gamma(gamma) => power(code, gamma),
+            Self::Compression(slope) => code / (slope - (slope - 1.0) * code),
         }
     }
 
@@ -176,7 +180,7 @@ impl ManifestLight {
                 Err(CaptureErrorKind::InvalidResponse)
             }
             (Some(_), None) => Ok(()),
-            (None, Some(gamma)) => check_gamma("light.gamma", gamma),
+            (None, Some(gamma)) => check_exponent("light.gamma", gamma),
             (None, None) => Err(CaptureErrorKind::MissingResponse),
         }
     }
@@ -297,8 +301,12 @@ impl Manifest {
                 &allowed,
             )?;
         }
-        if let CameraResponse::Gamma(gamma) = camera.response {
-            check_gamma("camera.response.gamma", gamma)?;
+        match camera.response {
+            CameraResponse::Linear | CameraResponse::Srgb => {}
+            CameraResponse::Gamma(gamma) => check_exponent("camera.response.gamma", gamma)?,
+            CameraResponse::Compression(slope) => {
+                check_exponent("camera.response.compression", slope)?;
+            }
         }
         light.check()?;
         if self.shots.is_empty() {
@@ -325,11 +333,12 @@ impl Manifest {
     }
 }
 
-fn check_gamma(field: &str, gamma: f64) -> Result<(), CaptureErrorKind> {
+/// An exponent, or a ratio of slopes.
+fn check_exponent(field: &str, value: f64) -> Result<(), CaptureErrorKind> {
     check_range(
-        (0.1..=10.0).contains(&gamma),
+        (0.1..=10.0).contains(&value),
         field,
-        gamma,
+        value,
         "between 0.1 and 10",
     )
 }

@@ -10,12 +10,12 @@
 mod camera_row_set;
 #[cfg(feature = "capture")]
 mod code_statistics;
+#[cfg(any(test, all(feature = "capture", not(target_arch = "wasm32"))))]
+mod defective_pixels;
 mod error;
 #[cfg(feature = "capture")]
 mod folder;
 mod group_ids;
-#[cfg(any(test, all(feature = "capture", not(target_arch = "wasm32"))))]
-mod hot_pixels;
 mod manifest;
 mod measurements;
 mod noise_estimate;
@@ -24,6 +24,8 @@ mod noise_model;
 pub use camera_row_set::CameraRowSet;
 #[cfg(feature = "capture")]
 pub use code_statistics::CodeStatistics;
+#[cfg(any(test, all(feature = "capture", not(target_arch = "wasm32"))))]
+pub use defective_pixels::DefectivePixels;
 pub use error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 #[cfg(feature = "capture")]
 pub use folder::{

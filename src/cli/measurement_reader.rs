@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::progress;
 use crate::capture::{
-    CameraRowSet, CaptureError, CaptureFolder, CodeStatistics, DarkFrame, LinearPhoto,
-    Measurements, NoiseModel, PhotographRowReader,
+    CameraRowSet, CaptureError, CaptureFolder, CodeStatistics, DarkFrame, DefectivePixels,
+    LinearPhoto, Measurements, NoiseModel, PhotographRowReader,
 };
 use crate::job_executor::Executor;
 
@@ -48,8 +48,8 @@ pub struct ReadSample {
     pub codes: CodeStatistics,
     /// Of all rows of the flood photograph, if there is one.
     pub flood_codes: Option<CodeStatistics>,
-    /// Number of pixels of the loaded rows that are filled from their neighbours.
-    pub hot_pixels: usize,
+    /// Pixels of the loaded rows that are filled from their neighbours.
+    pub defects: DefectivePixels,
 }
 
 /// The opened photographs of some shots.
@@ -75,14 +75,13 @@ impl<'a> MeasurementReader<'a> {
     }
 
     /// Makes `rows` the loaded rows of `measurements`: keeps those it has, reads the others, which must lie below all
-    /// rows read before. Calls `check` before each photograph, and stops if it fails. Returns the number of hot pixels,
-    /// which are filled from their neighbours.
+    /// rows read before. Calls `check` before each photograph, and stops if it fails.
     pub fn load_rows(
         &mut self,
         measurements: &mut Measurements,
         rows: &CameraRowSet,
         check: impl Fn() -> Result<()> + Sync,
-    ) -> Result<usize> {
+    ) -> Result<()> {
         let width = measurements.camera.width as usize;
         let first = rows.strips().first().map_or(0, |strip| strip.start);
         let obsolete = measurements.rows.iter().take_while(|y| *y < first).count();
@@ -96,7 +95,17 @@ impl<'a> MeasurementReader<'a> {
             Ok::<_, Error>(reader.read(rows, photo)?)
         })?;
         measurements.rows = rows.clone();
-        Ok(measurements.fill_hot_pixels())
+        Ok(())
+    }
+
+    /// Fills the hot and dead pixels of the loaded rows from their neighbours. The photographs have these statistics of
+    /// their `codes`.
+    pub fn fill_defects(
+        &self,
+        measurements: &mut Measurements,
+        codes: &CodeStatistics,
+    ) -> DefectivePixels {
+        fill_defects(measurements, f64::from(codes.step()) * self.code)
     }
 
     /// Loads `rows`, estimates the noise from them, and reads the rest of all files, which checks that they are whole.
@@ -107,21 +116,29 @@ impl<'a> MeasurementReader<'a> {
         executor: &impl Executor,
     ) -> Result<ReadSample> {
         let bar = progress::bar("reading", self.photos.len());
-        let hot_pixels = self.load_rows(measurements, rows, || {
+        self.load_rows(measurements, rows, || {
             bar.inc(1);
             Ok(executor.check_cancelled()?)
         })?;
         drop(bar);
         let codes = self.photos.into_par_iter().map(PhotographRowReader::finish);
         let codes = codes.try_reduce(CodeStatistics::default, |a, b| Ok(a.merge(b)))?;
-        measurements.noise = measurements
-            .noise
-            .with_quantum(f64::from(codes.step()) * self.code);
+        let quantum = f64::from(codes.step()) * self.code;
+        measurements.noise = measurements.noise.with_quantum(quantum);
+        let defects = fill_defects(measurements, quantum);
         measurements.noise = NoiseModel::with_gain_from(measurements);
         Ok(ReadSample {
             codes,
             flood_codes: None,
-            hot_pixels,
+            defects,
         })
+    }
+}
+
+/// Fills hot and dead pixels where codes are `quantum` apart.
+fn fill_defects(measurements: &mut Measurements, quantum: f64) -> DefectivePixels {
+    DefectivePixels {
+        hot: measurements.fill_hot_pixels(),
+        dead: measurements.fill_dead_pixels(quantum),
     }
 }

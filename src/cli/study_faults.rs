@@ -288,6 +288,7 @@ fn findings(report: &RecoverReport) -> Vec<String> {
             used.iter().any(|photo| photo.shift != Some([0.0; 2])),
         ),
         ("hot_pixels", report.hot_pixels > 0),
+        ("dead_pixels", report.dead_pixels > 0),
     ];
     let corrections = corrections.into_iter().filter(|(_, is_found)| *is_found);
     let mut findings: Vec<String> = corrections.map(|(name, _)| name.to_owned()).collect();

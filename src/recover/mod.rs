@@ -46,7 +46,9 @@ pub use error::RecoverError;
 pub use holdout_validation::HoldoutValidation;
 pub use method::Method;
 pub use nnls::Nnls;
-pub use photometry::{MOVED_CODE, PhotographCorrection, PhotographFault, ResponseHypothesis};
+pub use photometry::{
+    Flicker, MOVED_CODE, PhotographCorrection, PhotographFault, ResponseHypothesis,
+};
 pub use prepared_recovery::{PreparedRecovery, RecoverySettings, find_response};
 pub use sampling::MIN_PATTERNS;
 pub use window_size::{TailEstimate, WindowSizeEstimate};

@@ -11,7 +11,7 @@ use super::mean_function;
 use super::method::Method;
 use super::pattern_check;
 use super::photometry::{
-    self, CalibratedMeasurements, PhotographCorrection, PhotographFault, Photometry,
+    self, CalibratedMeasurements, Flicker, PhotographCorrection, PhotographFault, Photometry,
     ResampledPhotographs, ResponseHypothesis,
 };
 use super::pixelwise::PixelwiseRecovery;
@@ -205,6 +205,18 @@ impl PreparedRecovery {
         let used = &self.split.all;
         let input = (self.photometry).resampling_input(measurements, &self.geometry, used);
         photometry::estimate_dimming(input, executor)
+    }
+
+    /// Bands of exposure that differ from photograph to photograph, as lamps that flicker cause. `None` if there are none, or
+    /// too little is measured to tell. `measurements` are those that the recovery was prepared from.
+    pub fn flicker(
+        &self,
+        measurements: &Measurements,
+        executor: &impl Executor,
+    ) -> Option<Flicker> {
+        let used = &self.split.all;
+        let input = (self.photometry).resampling_input(measurements, &self.geometry, used);
+        photometry::find_flicker(input, executor)
     }
 
     /// A response of display or camera with which the photographs predict one another better than with the declared one.

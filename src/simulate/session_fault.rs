@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use rand_chacha::ChaCha8Rng;
@@ -49,6 +50,8 @@ pub enum SessionFaultKind {
     Dimming,
     /// Photographs have the curve of sRGB.
     Srgb,
+    /// Photographs have compressed highlights: codes rise so many times as fast at black as in proportion to light.
+    Compression,
     /// Samples above this share of white are saturated, which is not declared.
     Clip,
     /// This share of the pixels is hot, and as many are dead.
@@ -64,11 +67,21 @@ pub enum SessionFaultKind {
 
 use SessionFaultKind as Kind;
 
+impl SessionFaultKind {
+    /// Range of the sizes.
+    fn sizes(self) -> RangeInclusive<f64> {
+        match self {
+            Self::Gamma | Self::Compression => 0.1..=10.0,
+            _ => 0.0..=16.0,
+        }
+    }
+}
+
 /// Periods of flickering light in the time that a rolling shutter takes from the first row to the last.
 const FLICKER_PERIODS: f64 = 3.0;
 
 /// Kinds, their names, and the sizes that they have where none is given.
-const KINDS: [(&str, Kind, Option<f64>); 22] = [
+const KINDS: [(&str, Kind, Option<f64>); 23] = [
     ("underexposed", Kind::Underexposed, Some(0.5)),
     ("object", Kind::Object, None),
     ("pattern", Kind::Pattern, None),
@@ -86,6 +99,7 @@ const KINDS: [(&str, Kind, Option<f64>); 22] = [
     ("gamma", Kind::Gamma, Some(1.8)),
     ("dimming", Kind::Dimming, Some(0.15)),
     ("srgb", Kind::Srgb, None),
+    ("compression", Kind::Compression, Some(1.5)),
     ("clip", Kind::Clip, Some(0.4)),
     ("defects", Kind::Defects, Some(0.001)),
     ("8-bit", Kind::EightBit, None),
@@ -237,6 +251,13 @@ impl SessionFault {
                     *code = (Camera::BLACK + range * curve).round() as u16;
                 }
             }
+            Kind::Compression => {
+                for code in samples {
+                    let y = (f64::from(*code) - Camera::BLACK) / range;
+                    let curve = self.size * y / (1.0 + (self.size - 1.0) * y);
+                    *code = (Camera::BLACK + range * curve).round() as u16;
+                }
+            }
             Kind::Clip => {
                 let white = (Camera::BLACK + range * self.size) as u16;
                 samples
@@ -317,12 +338,13 @@ impl FromStr for SessionFault {
             (None, default) => default.unwrap_or(0.0),
             (Some(_), None) => return Err(format!("{name} has no size; give {name} alone")),
             (Some(size), Some(_)) => match size.parse::<f64>() {
-                Ok(size) if kind == Kind::Gamma && (0.1..=10.0).contains(&size) => size,
-                Ok(size) if kind != Kind::Gamma && (0.0..=16.0).contains(&size) => size,
-                _ if kind == Kind::Gamma => {
-                    return Err("the size of gamma must be a number from 0.1 to 10".to_owned());
+                Ok(size) if kind.sizes().contains(&size) => size,
+                _ => {
+                    let (least, largest) = kind.sizes().into_inner();
+                    return Err(format!(
+                        "the size of {name} must be a number from {least} to {largest}"
+                    ));
                 }
-                _ => return Err(format!("the size of {name} must be a number from 0 to 16")),
             },
         };
         Ok(Self { kind, size })
@@ -354,6 +376,7 @@ mod tests {
             ("jiter", "the faults are"),
             ("swap=1", "no size"),
             ("move=x", "0 to 16"),
+            ("gamma=0", "0.1 to 10"),
         ] {
             let error = text.parse::<SessionFault>().unwrap_err();
             assert!(error.contains(part), "{error}");
@@ -418,6 +441,8 @@ mod tests {
             (count("defects=0.01", u16::MAX), count("defects=0.01", 512)),
             (10, 10)
         );
+        // 33.4 % of white becomes 50.1 %.
+        assert_eq!(codes("compression=2")[396][0], 30_322);
         assert!(count("clip=0.5", (512.0f64 + 0.5 * 59_488.0) as u16) > 300);
     }
 

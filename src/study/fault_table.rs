@@ -82,7 +82,7 @@ pub fn fault_table(
     section.add_paragraph(
         "`ltm-export photograph --fault` photographs a capture again with each fault, and `ltm-export recover --lossless` \
          recovers it: SNR of T in dB, and what `recover` reports. `gain`, `stray_light` and `shift` of photographs are \
-         corrected, and `hot_pixels` filled; the other words are codes of warnings and of photographs that are left out, with \
+         corrected, and `hot_pixels` and `dead_pixels` filled; the other words are codes of warnings and of photographs that are left out, with \
          their numbers (docs/capture.md explains faults and codes). Where a response is told that differs from the declared one, \
          `--trust estimated` recovers with the estimate. “—”: the capture cannot have this fault.",
     );

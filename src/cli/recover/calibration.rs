@@ -1,4 +1,4 @@
-//! Fields of the manifest that the photographs contradict: what they say instead.
+//! Fields of the manifest that the photographs contradict, with their estimates.
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -8,10 +8,10 @@ use crate::capture::{CameraResponse, CodeStatistics, Manifest};
 use crate::recover::ResponseHypothesis;
 use crate::transport::{CHANNELS, Decibels};
 
-/// Exponents are rounded to hundredths.
+/// Exponents and ratios of slopes are rounded to hundredths.
 const EXPONENT_PRECISION: f64 = 100.0;
-/// Logarithm of the exponent of a camera whose codes are proportional to light.
-const MAX_LINEAR_LOG_EXPONENT: f64 = 0.05;
+/// Logarithm of the exponent, or ratio of slopes, of a camera whose codes are proportional to light.
+const MAX_LINEAR_LOG_PARAMETER: f64 = 0.05;
 /// Exponent that is closest to the transfer function of sRGB.
 const SRGB_EXPONENT: f64 = 2.2;
 
@@ -125,7 +125,8 @@ pub fn with_response(manifest: &Manifest, hypothesis: ResponseHypothesis) -> Man
             }
         },
         ResponseHypothesis::Camera(response) => {
-            amended.camera.response = composed(amended.camera.response, response);
+            let declared = amended.camera.response;
+            amended.camera.response = composed(declared, response).unwrap_or(declared);
         }
     }
     amended
@@ -151,7 +152,7 @@ pub fn changed_responses(declared: &Manifest, estimated: &Manifest) -> Vec<Estim
 pub fn with_dimming(manifest: &Manifest, dimming: f64) -> (Manifest, EstimatedField) {
     let mut amended = manifest.clone();
     let declared = amended.light.dimming;
-    // What is declared already dims the patterns.
+    // The patterns are dimmed as declared.
     let dimming = rounded_share(1.0 - (1.0 - dimming) * (1.0 - declared.unwrap_or(0.0)));
     amended.light.dimming = Some(dimming);
     (
@@ -181,27 +182,32 @@ pub fn response_reason(
     format!("{what}: with {}, {rise}", field.member())
 }
 
-/// The response of a camera whose photographs, linearised by `declared`, are linear after `then`.
-fn composed(declared: CameraResponse, then: CameraResponse) -> CameraResponse {
-    let exponent = match declared {
-        CameraResponse::Linear => 1.0,
-        CameraResponse::Gamma(exponent) => exponent,
-        CameraResponse::Srgb => SRGB_EXPONENT,
+/// The response of a camera whose photographs, linearised by `declared`, are linear after `then`, if it has a name.
+fn composed(declared: CameraResponse, then: CameraResponse) -> Option<CameraResponse> {
+    use CameraResponse::{Compression, Gamma, Linear, Srgb};
+    let exponent = |response| match response {
+        Linear => Some(1.0),
+        Gamma(exponent) => Some(exponent),
+        Srgb => Some(SRGB_EXPONENT),
+        Compression(_) => None,
     };
-    match (declared, then) {
-        (CameraResponse::Linear, CameraResponse::Gamma(then)) => {
-            CameraResponse::Gamma(rounded(then))
-        }
-        (CameraResponse::Linear, then) => then,
-        (_, CameraResponse::Gamma(then))
-            if (exponent * then).ln().abs() < MAX_LINEAR_LOG_EXPONENT =>
-        {
-            CameraResponse::Linear
-        }
-        (_, CameraResponse::Gamma(then)) => CameraResponse::Gamma(rounded(exponent * then)),
-        (_, CameraResponse::Srgb) => CameraResponse::Gamma(rounded(exponent * SRGB_EXPONENT)),
-        (declared, CameraResponse::Linear) => declared,
-    }
+    let composed = match (declared, then) {
+        (Linear, Srgb) => return Some(Srgb),
+        (Linear, Compression(then)) => Compression(then),
+        (Compression(declared), Compression(then)) => Compression(declared * then),
+        (declared, then) => Gamma(exponent(declared)? * exponent(then)?),
+    };
+    Some(match composed {
+        Gamma(parameter) | Compression(parameter) if is_nearly_one(parameter) => Linear,
+        Gamma(exponent) => Gamma(rounded(exponent)),
+        Compression(slope) => Compression(rounded(slope)),
+        other => other,
+    })
+}
+
+/// Whether an exponent, or ratio of slopes, is that of a linear response.
+fn is_nearly_one(parameter: f64) -> bool {
+    parameter.ln().abs() < MAX_LINEAR_LOG_PARAMETER
 }
 
 /// To the precision of an estimate, within the range that a manifest allows.
@@ -222,7 +228,7 @@ mod tests {
 
     #[test]
     fn responses_of_the_camera_are_composed() {
-        use CameraResponse::{Gamma, Linear, Srgb};
+        use CameraResponse::{Compression, Gamma, Linear, Srgb};
         for (declared, then, expected) in [
             (Linear, Srgb, Srgb),
             (Linear, Gamma(1.504), Gamma(1.5)),
@@ -230,9 +236,17 @@ mod tests {
             (Gamma(2.0), Gamma(0.5), Linear),
             (Gamma(0.5), Srgb, Gamma(1.1)),
             (Srgb, Gamma(0.45), Linear),
+            (Linear, Compression(1.304), Compression(1.3)),
+            (Compression(1.5), Compression(1.2), Compression(1.8)),
+            (Compression(1.5), Compression(0.66), Linear),
         ] {
-            assert_eq!(composed(declared, then), expected, "{declared:?} {then:?}");
+            assert_eq!(
+                composed(declared, then),
+                Some(expected),
+                "{declared:?} {then:?}"
+            );
         }
+        assert_eq!(composed(Gamma(2.0), Compression(1.5)), None);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
 use super::messages;
 use super::preparation::{CapturePreparation, PreparedCapture};
 use super::report::{RecoverReport, photograph_reports};
-use crate::capture::CaptureFolder;
+use crate::capture::{CaptureFolder, DefectivePixels};
 use crate::cli::measurement_reader::MeasurementReader;
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::peak_rss_bytes;
@@ -89,8 +89,8 @@ impl RecoverJob<'_> {
         let CaptureSample { folder, shots, .. } = &sample;
         let (folder, shots) = (folder.clone(), shots.clone());
         let noise = sample.measurements.noise;
-        let (overexposed, hot) = self.recover_tiles(sample, recovery, checkpoint)?;
-        messages::note_hot_pixels(hot);
+        let (overexposed, defects) = self.recover_tiles(sample, recovery, checkpoint)?;
+        messages::note_defective_pixels(defects);
         findings.warn(messages::overexposure(overexposed));
         findings.check(self.args.strict)?;
         let provenance = Provenance::new(folder.manifest(), self.shots);
@@ -120,7 +120,8 @@ impl RecoverJob<'_> {
             strips: self.source.plan.strips(recovery.halo()).len(),
             saturated_samples: saturated,
             overexposed_pixels: overexposed,
-            hot_pixels: hot,
+            hot_pixels: defects.hot,
+            dead_pixels: defects.dead,
             estimated_fields: findings.estimated_fields,
             file_bytes,
             photograph_reports: photograph_reports(
@@ -133,14 +134,14 @@ impl RecoverJob<'_> {
         })
     }
 
-    /// Recovers the tiles that the checkpoint lacks, strip by strip. Returns the numbers of overexposed and of hot
+    /// Recovers the tiles that the checkpoint lacks, strip by strip. Returns the numbers of overexposed and of defective
     /// pixels.
     fn recover_tiles(
         &self,
         sample: CaptureSample,
         recovery: &PreparedRecovery,
         checkpoint: &Mutex<Checkpoint>,
-    ) -> Result<(usize, usize)> {
+    ) -> Result<(usize, DefectivePixels)> {
         let CaptureSample {
             folder,
             shots,
@@ -161,11 +162,15 @@ impl RecoverJob<'_> {
         }
         let has_saturation = read.codes.saturated > 0;
         let mut overexposed = 0;
-        let mut hot = if reader.is_some() { 0 } else { read.hot_pixels };
+        let mut defects = match reader {
+            Some(_) => DefectivePixels::default(),
+            None => read.defects,
+        };
         for (tile_rows, rows) in plan.strips(recovery.halo()) {
             if let Some(reader) = &mut reader {
                 let check = || Ok(cores.check_cancelled()?);
-                hot += reader.load_rows(&mut measurements, &rows, check)?;
+                reader.load_rows(&mut measurements, &rows, check)?;
+                defects += reader.fill_defects(&mut measurements, &read.codes);
             }
             let recover_tile = |i: u32| -> Result<usize> {
                 let (i, rect) = (i as usize, geometry.tile(i as usize));
@@ -187,7 +192,7 @@ impl RecoverJob<'_> {
             overexposed += counts.try_reduce(|| 0, |a, b| Ok(a + b))?;
         }
         drop(bar);
-        Ok((overexposed, hot))
+        Ok((overexposed, defects))
     }
 
     /// Encodes the tiles in `checkpoint`. An interruption is reported as [`Cancelled`].

@@ -5,14 +5,14 @@ use std::ops::Range;
 use anyhow::{Error, anyhow};
 use serde::Serialize;
 
-use crate::capture::{CaptureFolder, CodeStatistics, Measurements};
+use crate::capture::{CaptureFolder, CodeStatistics, DefectivePixels, Measurements};
 use crate::cli::value_parsers::ByteCount;
 use crate::export::{
     MIN_PLAUSIBLE_SNR, PreparedExport, TooFewShots, TooLittleMemory, has_implausible_saturation,
     saturated_percent,
 };
 use crate::recover::{
-    CaptureFault, MIN_PATTERNS, MOVED_CODE, PhotographCorrection, PhotographFault,
+    CaptureFault, Flicker, MIN_PATTERNS, MOVED_CODE, PhotographCorrection, PhotographFault,
     PreparedRecovery, TailEstimate,
 };
 use crate::transport::Decibels;
@@ -116,6 +116,24 @@ pub fn display_sharpness([finest, next]: [f32; 2]) -> Option<Warning> {
     })
 }
 
+/// Warns of a light that flickers.
+pub fn flicker(
+    Flicker {
+        amplitude,
+        is_along_rows,
+    }: Flicker,
+) -> Warning {
+    let lines = if is_along_rows { "columns" } else { "rows" };
+    Warning {
+        code: "light-flickers",
+        message: format!(
+            "the exposure of {lines} varies by about {:.1} %, in every photograph differently: the light flickers. Expose for a \
+             multiple of the mains' half period (10 ms at 50 Hz, 8.33 ms at 60 Hz), or use a lamp that does not flicker",
+            100.0 * amplitude
+        ),
+    }
+}
+
 /// Why a display seems to dim bright pictures by `dimming`.
 pub fn dimming_reason(dimming: f64) -> String {
     format!(
@@ -126,9 +144,13 @@ pub fn dimming_reason(dimming: f64) -> String {
 }
 
 /// Notes pixels that are filled from their neighbours.
-pub fn note_hot_pixels(count: usize) {
-    if count > 0 {
-        eprintln!("note: {count} hot pixels are filled from their neighbours");
+pub fn note_defective_pixels(defects: DefectivePixels) {
+    for (count, kind) in [(defects.hot, "hot"), (defects.dead, "dead")] {
+        match count {
+            0 => {}
+            1 => eprintln!("note: 1 {kind} pixel is filled from its neighbours"),
+            _ => eprintln!("note: {count} {kind} pixels are filled from their neighbours"),
+        }
     }
 }
 

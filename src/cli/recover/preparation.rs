@@ -118,6 +118,12 @@ impl CapturePreparation<'_> {
             (Err(_), Some(cause)) => bail!(cause),
             (Err(error), None) => return Err(self.recover_error(error, &sample)),
         };
+        if cause.is_none() && findings.are_responses_right() {
+            let flicker = prepared
+                .recovery
+                .flicker(&sample.measurements, self.source.cores);
+            findings.warn(flicker.map(messages::flicker));
+        }
         findings.warn(messages::preparation(&prepared));
         findings.warn(messages::photographs(
             &sample.folder,
@@ -292,7 +298,9 @@ impl CapturePreparation<'_> {
             // The recovery has told, or will tell, why nothing can be estimated.
             found => found.ok().flatten(),
         };
-        Ok(found.map(|found| calibration::with_response(sample.folder.manifest(), found)))
+        let declared = sample.folder.manifest();
+        let likely = found.map(|found| calibration::with_response(declared, found));
+        Ok(likely.filter(|likely| likely != declared))
     }
 
     /// Looks whether the display dims bright pictures.

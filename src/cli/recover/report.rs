@@ -43,6 +43,8 @@ pub struct RecoverReport {
     pub overexposed_pixels: usize,
     /// Number of hot pixels, which are filled from their neighbours.
     pub hot_pixels: usize,
+    /// Number of dead pixels, which are filled likewise.
+    pub dead_pixels: usize,
     /// Fields of the manifest that the photographs contradict.
     pub estimated_fields: Vec<EstimatedField>,
     pub file_bytes: u64,

@@ -10,7 +10,7 @@
 //! not pass for stray light, which does not depend on brightness.
 
 use super::resampling::{ResampledPhotographs, ResamplingInput};
-use super::window_covariance::{ScaledPixel, WindowCovariance, WindowModel, gradients};
+use super::window_covariance::{AXES, ScaledPixel, WindowCovariance, WindowModel, differences};
 use crate::capture::Measurements;
 use crate::job_executor::{Cancelled, Executor, PARTS, share_of_jobs};
 use crate::linalg::{self, add_scaled, dot, vectorise};
@@ -140,9 +140,10 @@ struct CalibrationSums {
     scores: Vec<f64>,
 }
 
-/// Columns of the regression of the flood photograph: its prediction, gradients to the right and down, a constant, and
-/// the photograph.
-const FLOOD_COLUMNS: usize = 5;
+/// Columns of the regression of the flood photograph: its prediction, gradients to the right and down, second differences
+/// along both axes, a constant, and the photograph. Predictions from resampled photographs are less sharp than the flood
+/// photograph; without second differences, part of this would pass for a shift.
+const FLOOD_COLUMNS: usize = 7;
 
 /// Kinds of unknowns whose columns differ from photograph to photograph: scales and shifts.
 const VARYING: usize = 3;
@@ -233,10 +234,18 @@ impl CalibrationSums {
             if measured.is_nan() {
                 continue;
             }
-            let [right, down] = gradients(measurements.camera, sample, scaled.pixel);
-            let predicted = predict(window, flood, scaled)[0];
-            let columns = [measured, right, down].map(|value| scaled.unit * value);
-            let columns = [predicted, columns[1], columns[2], scaled.unit, columns[0]];
+            let [[right, second_x], [down, second_y]] =
+                AXES.map(|step| differences(measurements.camera, sample, scaled.pixel, step));
+            let mut columns = [
+                predict(window, flood, scaled)[0] / scaled.unit,
+                right,
+                down,
+                second_x,
+                second_y,
+                1.0,
+                measured,
+            ];
+            columns.iter_mut().for_each(|value| *value *= scaled.unit);
             for (row, factor) in self.flood.chunks_exact_mut(FLOOD_COLUMNS).zip(columns) {
                 add_scaled(row, factor, &columns);
             }

@@ -38,6 +38,10 @@ const MAX_SHIFT_ERROR: f64 = 0.05;
 /// Distance in camera pixels above which photographs are left out if all others were taken from one place: they would add
 /// less than resampling takes away.
 const MIN_MOVE: f64 = 0.35;
+/// Values of the softness of interpolation that are compared, at equal distances; the first is used before.
+const SOFTNESSES: [f64; 3] = [0.0, 0.5, 1.0];
+/// Steps of the shifts after the softness is known.
+const STEPS_AFTER_SOFTNESS: usize = 2;
 /// Steps of the shifts of photographs that are tried once more.
 const MAX_READMISSION_STEPS: usize = 2;
 /// Median shift of the other photographs, in camera pixels, up to which the camera was steady.
@@ -76,6 +80,7 @@ pub(in crate::recover) async fn estimate(
     let mut photometry = Photometry {
         mean_function: mean_function::smooth(mean_function, side),
         corrections: vec![PhotographCorrection::IDENTITY; count],
+        softness: SOFTNESSES[0],
         faults: Vec::new(),
     };
     let mut used: Vec<usize> = (0..count).collect();
@@ -85,6 +90,8 @@ pub(in crate::recover) async fn estimate(
     let mut readmission_steps = 0;
     let max_outliers = (MAX_OUTLIER_SHARE * count as f64) as usize;
     let (mut steps, mut shift_steps) = (0, 0);
+    // What is unexplained with each of the softnesses that were tried.
+    let (mut softness_shares, mut tried_softnesses) = ([0.0; 3], 0);
     let last = loop {
         preparation.executor.check_cancelled()?;
         let input = photometry.resampling_input(measurements, &preparation.geometry, &used);
@@ -92,6 +99,16 @@ pub(in crate::recover) async fn estimate(
         let Some(step) = step else {
             return Ok(Photometry::default());
         };
+        if (1..SOFTNESSES.len()).contains(&tried_softnesses) {
+            softness_shares[tried_softnesses] = step.unexplained_share;
+            tried_softnesses += 1;
+            photometry.softness = match tried_softnesses < SOFTNESSES.len() {
+                true => SOFTNESSES[tried_softnesses],
+                false => best_softness(softness_shares),
+            };
+            (steps, shift_steps) = (0, MAX_SHIFT_STEPS - STEPS_AFTER_SOFTNESS);
+            continue;
+        }
         if steps < MAX_STEPS && step.is_significant() {
             steps += 1;
             step.apply(&used, &mut photometry.corrections);
@@ -99,15 +116,17 @@ pub(in crate::recover) async fn estimate(
         }
         if readmission_steps > 0 {
             readmission_steps -= 1;
-            step.apply_shifts(&used, &mut photometry.corrections, |l| {
-                readmitted.contains(&l)
-            });
+            step.apply_shifts(&used, &mut photometry.corrections, &readmitted);
             continue;
         }
         let found = step.outliers();
         if found.is_empty() && shift_steps < MAX_SHIFT_STEPS && step.has_shifts() {
-            step.apply_shifts(&used, &mut photometry.corrections, |_| true);
+            step.apply_shifts(&used, &mut photometry.corrections, &used);
             (steps, shift_steps) = (0, shift_steps + 1);
+        } else if found.is_empty() && shift_steps > 0 && tried_softnesses == 0 {
+            softness_shares[0] = step.unexplained_share;
+            photometry.softness = SOFTNESSES[1];
+            tried_softnesses = 1;
         } else if !found.is_empty() {
             if outliers.len() + found.len() > max_outliers {
                 return Ok(Photometry::default());
@@ -143,6 +162,9 @@ pub(in crate::recover) async fn estimate(
     if last.unexplained_share.is_nan() || last.unexplained_share > MAX_UNEXPLAINED_SHARE {
         return Ok(Photometry::default());
     }
+    if shift_steps > 0 {
+        last.apply_shifts(&used, &mut photometry.corrections, &used);
+    }
     for l in 0..count {
         if !used.contains(&l) {
             photometry.corrections[l] = PhotographCorrection::IDENTITY;
@@ -172,6 +194,14 @@ pub(in crate::recover) async fn estimate(
     let order = linalg::ascending_order(faults.iter().map(|fault| fault.0 as f64));
     photometry.faults = order.into_iter().map(|i| faults[i]).collect();
     Ok(photometry)
+}
+
+/// The softness with which the least of the differences between photographs is unexplained, by the shares that are
+/// unexplained with [`SOFTNESSES`]. Interpolated pictures depend on it linearly, so that shares lie on a parabola.
+fn best_softness(shares: [f64; 3]) -> f64 {
+    let (step, difference) = (SOFTNESSES[1], shares[2] - shares[0]);
+    let curvature = (shares[0] - 2.0 * shares[1] + shares[2]).max(f64::MIN_POSITIVE);
+    (step - 0.5 * step * difference / curvature).clamp(0.0, 1.0)
 }
 
 impl CorrectionStep {
@@ -211,20 +241,24 @@ impl CorrectionStep {
         axes.any(|(shifts, errors)| are_significant(shifts, errors))
     }
 
-    /// Adds the step of the shifts to the corrections of those of the photographs `used` that `is_adjusted`, relative to
+    /// Adds the step of the shifts to the corrections of those of the photographs `used` that are `adjusted`, relative to
     /// the camera's place.
     fn apply_shifts(
         &self,
         used: &[usize],
         corrections: &mut [PhotographCorrection],
-        is_adjusted: impl Fn(usize) -> bool,
+        adjusted: &[usize],
     ) {
         for axis in 0..2 {
             let step = used.iter().zip(&self.shifts[axis]);
             let shifts = step.map(|(&l, step)| corrections[l].shift[axis] + step);
             let shifts: Vec<f64> = shifts.collect();
             let place = place(&shifts, self.flood_shift.map(|shift| shift[axis]));
-            for (&l, shift) in used.iter().zip(shifts).filter(|(l, _)| is_adjusted(**l)) {
+            for (&l, shift) in used
+                .iter()
+                .zip(shifts)
+                .filter(|(l, _)| adjusted.contains(l))
+            {
                 corrections[l].shift[axis] = (shift - place).clamp(-MAX_SHIFT, MAX_SHIFT);
             }
         }

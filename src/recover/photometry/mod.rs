@@ -21,6 +21,7 @@ mod dimming;
 mod equations;
 mod estimate;
 mod faults;
+mod flicker;
 mod resampling;
 mod response;
 #[cfg(all(test, not(target_arch = "wasm32")))]
@@ -33,6 +34,8 @@ pub(super) use dimming::estimate as estimate_dimming;
 pub(super) use equations::max_bytes;
 pub(super) use estimate::estimate;
 pub use faults::{MOVED_CODE, PhotographFault};
+pub use flicker::Flicker;
+pub(super) use flicker::find as find_flicker;
 pub(super) use resampling::{
     HALO, ResampledPhotographs, ResamplingInput, max_prepared_bytes, max_tile_bytes,
 };
@@ -48,6 +51,8 @@ pub struct Photometry {
     /// needed to recover tiles elsewhere.
     #[serde(skip)]
     pub faults: Vec<(usize, PhotographFault)>,
+    /// How softly shifted pictures interpolate: 0 as cubic splines, 1 as straight lines.
+    pub softness: f64,
     /// The mean function that shifted photographs are [resampled](resampling) with, `[slot]`.
     pub mean_function: Vec<f64>,
 }
@@ -70,6 +75,7 @@ impl Photometry {
             corrections: &self.corrections,
             geometry,
             mean_function: &self.mean_function,
+            softness: self.softness,
             used,
         }
     }

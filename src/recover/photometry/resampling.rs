@@ -57,6 +57,8 @@ pub(in crate::recover) struct ResamplingInput<'a> {
     pub geometry: &'a Geometry,
     /// `[slot]`.
     pub mean_function: &'a [f64],
+    /// [`Photometry::softness`](super::Photometry::softness).
+    pub softness: f64,
     /// The photographs that belong to the capture; others are not resampled.
     pub used: &'a [usize],
 }
@@ -191,7 +193,8 @@ impl<'a> ResamplingInput<'a> {
             for (i, &l) in self.used.iter().enumerate() {
                 if self.corrections[l].is_shifted() {
                     let shift = self.corrections[l].shift;
-                    let changes = shift_changes(&predicted[i], inner, target, shift);
+                    let taps = shift.map(|d| taps(d, self.softness));
+                    let changes = shift_changes(&predicted[i], inner, target, taps);
                     for (pixel, change) in target.pixels().zip(&changes) {
                         let n = index_in(region, pixel);
                         (0..CHANNELS)
@@ -297,15 +300,15 @@ fn predict_window(
     }
 }
 
-/// What a shift changes of the picture `[pixel, channel]` of the region `inner`, in the region `target` inside it.
+/// What a shift by the taps along x and y changes of the picture `[pixel, channel]` of the region `inner`, in the region
+/// `target` inside it.
 /// Beyond the border of the picture its last pixels repeat.
 fn shift_changes(
     picture: &[f64],
     inner: TileRect,
     target: TileRect,
-    [dx, dy]: [f64; 2],
+    [(x_taps, x_first), (y_taps, y_first)]: [Taps; 2],
 ) -> Vec<[f64; CHANNELS]> {
-    let ((x_taps, x_first), (y_taps, y_first)) = (taps(dx), taps(dy));
     let (width, height) = (
         i64::from(inner.extent.width),
         i64::from(inner.extent.height),
@@ -342,15 +345,22 @@ fn shift_changes(
 /// Number of pixels that interpolation takes along one axis.
 const TAPS: usize = 2 * RADIUS as usize;
 
-/// Weights that interpolate along one axis at a place shifted by `-d`, and the distance of the first of their pixels:
-/// the cardinal cubic spline (Unser, Splines: a perfect fit for signal and image processing, 1999), cut off where it has
-/// fallen to a hundredth.
-fn taps(d: f64) -> ([f64; TAPS], i64) {
+/// Weights that interpolate along one axis, and the distance of the first of their pixels.
+type Taps = ([f64; TAPS], i64);
+
+/// Interpolates at a place shifted by `-d`, by the cardinal cubic spline (Unser, Splines: a perfect fit for signal and image
+/// processing, 1999), cut off where it has fallen to a hundredth, and with the weight `softness` by a straight line. How a
+/// picture changes when the camera moves depends on how sharp it is: splines suit a smooth picture, and straight lines one
+/// whose edges are sharper than its pixels.
+fn taps(d: f64, softness: f64) -> Taps {
     let cell = (-d).floor();
     let fraction = -d - cell;
     let first = 1 - i64::from(RADIUS);
-    let mut taps: [f64; TAPS] =
-        std::array::from_fn(|k| cardinal_spline(fraction - (first + k as i64) as f64));
+    let mut taps: [f64; TAPS] = std::array::from_fn(|k| {
+        let x = fraction - (first + k as i64) as f64;
+        let line = (1.0 - x.abs()).max(0.0);
+        (1.0 - softness) * cardinal_spline(x) + softness * line
+    });
     let sum: f64 = taps.iter().sum();
     taps.iter_mut().for_each(|tap| *tap /= sum);
     (taps, cell as i64 + first)
@@ -388,20 +398,25 @@ mod tests {
 
     #[test]
     fn interpolation_follows_a_smooth_curve_and_keeps_samples() {
-        let (still, first) = taps(0.0);
+        let (still, first) = taps(0.0, 0.3);
         for (k, tap) in still.iter().enumerate() {
             let expected = if k as i64 + first == 0 { 1.0 } else { 0.0 };
             assert!((tap - expected).abs() < 1e-12, "{still:?}");
         }
         for d in [-0.6, -0.2, 0.05, 0.5] {
-            let (taps, first) = taps(d);
+            let value = |softness: f64, curve: &dyn Fn(f64) -> f64| -> f64 {
+                let (taps, first) = taps(d, softness);
+                let values = taps.iter().enumerate();
+                values
+                    .map(|(k, tap)| tap * curve((first + k as i64) as f64))
+                    .sum()
+            };
             let curve = |x: f64| (0.9 * x + 0.4).sin();
-            let value: f64 = taps
-                .iter()
-                .enumerate()
-                .map(|(k, tap)| tap * curve((first + k as i64) as f64))
-                .sum();
-            assert!((value - curve(-d)).abs() < 0.006, "{d}: {value}");
+            let smooth = value(0.0, &curve);
+            assert!((smooth - curve(-d)).abs() < 0.006, "{d}: {smooth}");
+            let edge = |x: f64| if x > 0.5 { 1.0 } else { 0.0 };
+            let soft = value(1.0, &edge);
+            assert!((soft - (-d).max(0.0)).abs() < 1e-12, "{d}: {soft}");
         }
     }
 }

@@ -19,20 +19,20 @@ const MAX_SQUARES: usize = 64;
 /// Fewest squares and photographs that tell a response.
 const MIN_SQUARES: usize = 16;
 const MIN_PHOTOGRAPHS: usize = 24;
-/// Logarithm of the ratio of neighbouring exponents of the search, and the range of exponents.
+/// Logarithm of the ratio of neighbouring exponents, or ratios of slopes, of the search, and their range.
 const LOG_STEP: f64 = 0.1;
-const MAX_LOG_EXPONENT: f64 = 1.25;
+const MAX_LOG_PARAMETER: f64 = 1.25;
 /// Rounds of parabolic interpolation.
 const REFINEMENTS: usize = 5;
-/// Logarithm of the smallest exponent that is told.
-const MIN_LOG_EXPONENT: f64 = 0.01;
+/// Logarithm of the smallest exponent, or ratio of slopes, that is told.
+const MIN_LOG_PARAMETER: f64 = 0.01;
 /// Fall of the logarithm of the relative prediction error that is worth a trial, and the standard errors by which it must
 /// differ from zero.
 const MIN_IMPROVEMENT: f64 = 0.01;
 const MIN_SIGNIFICANCE: f64 = 4.0;
-/// Fall of the same logarithm by which a power must explain the photographs better than the curve of sRGB, which is likelier
-/// and nearly equal.
-const MIN_POWER_ADVANTAGE: f64 = 0.3;
+/// Fall of the same logarithm by which another curve must explain the photographs better than that of sRGB, which is
+/// likelier.
+const MIN_ADVANTAGE_OVER_SRGB: f64 = 0.3;
 
 /// A response that explains the photographs better than the declared one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,18 +124,27 @@ impl<E: Executor> ResponseSearch<'_, E> {
         let declared = self.score(declared);
         let mut best = declared.clone();
         let camera = |exponent| Hypothesis::Camera(CameraResponse::Gamma(exponent));
-        let mut candidates = vec![self.best_exponent(&declared, camera)?];
+        let mut candidates = vec![self.best_parameter(&declared, camera)?];
+        // A curve that is nearly a power may also be that of compressed highlights.
+        if candidates[0].is_better_than(&declared) {
+            let camera = |slope| Hypothesis::Camera(CameraResponse::Compression(slope));
+            candidates.push(self.best_parameter(&declared, camera)?);
+        }
         // Only a curve of about this exponent can be that of sRGB.
         if let Hypothesis::Camera(CameraResponse::Gamma(1.4..)) = candidates[0].hypothesis {
             let srgb = self.score(Hypothesis::Camera(CameraResponse::Srgb));
-            if srgb.mean() < candidates[0].mean() + MIN_POWER_ADVANTAGE {
-                candidates[0] = srgb;
+            let best = candidates
+                .iter()
+                .map(Scored::mean)
+                .fold(f64::INFINITY, f64::min);
+            if srgb.mean() < best + MIN_ADVANTAGE_OVER_SRGB {
+                candidates = vec![srgb];
             }
         }
         let patterns = &self.measurements.patterns;
         if patterns.iter().any(Pattern::has_grey_levels) {
             let display = |exponent| Hypothesis::Display { exponent };
-            candidates.push(self.best_exponent(&declared, display)?);
+            candidates.push(self.best_parameter(&declared, display)?);
         }
         for candidate in candidates {
             if candidate.mean() < best.mean() {
@@ -143,18 +152,20 @@ impl<E: Executor> ResponseSearch<'_, E> {
             }
         }
         let is_far = match best.hypothesis {
-            Hypothesis::Display { exponent }
-            | Hypothesis::Camera(CameraResponse::Gamma(exponent)) => {
-                libm::log(exponent).abs() > MIN_LOG_EXPONENT
+            Hypothesis::Display {
+                exponent: parameter,
             }
+            | Hypothesis::Camera(
+                CameraResponse::Gamma(parameter) | CameraResponse::Compression(parameter),
+            ) => libm::log(parameter).abs() > MIN_LOG_PARAMETER,
             _ => true,
         };
         Ok((is_far && best.is_better_than(&declared)).then_some(best.hypothesis))
     }
 
-    /// The exponent with the lowest prediction errors: by steps as long as these fall, then by parabolas through the three
+    /// The exponent, or ratio of slopes, with the lowest prediction errors: by steps as long as these fall, then by parabolas through the three
     /// best.
-    fn best_exponent(
+    fn best_parameter(
         &self,
         declared: &Scored,
         hypothesis: impl Fn(f64) -> Hypothesis,
@@ -169,7 +180,7 @@ impl<E: Executor> ResponseSearch<'_, E> {
                 last if last + 1 == points.len() => (points[last].0, points[last].0 + step),
                 _ => break,
             };
-            let next = next.clamp(-MAX_LOG_EXPONENT, MAX_LOG_EXPONENT);
+            let next = next.clamp(-MAX_LOG_PARAMETER, MAX_LOG_PARAMETER);
             if next == end {
                 break;
             }
@@ -185,7 +196,7 @@ impl<E: Executor> ResponseSearch<'_, E> {
             let [a, b, c] =
                 [lowest - 1, lowest, lowest + 1].map(|i| (points[i].0, points[i].1.mean()));
             let minimum = parabola_minimum(a, b, c);
-            if (minimum - b.0).abs() < 0.1 * MIN_LOG_EXPONENT {
+            if (minimum - b.0).abs() < 0.1 * MIN_LOG_PARAMETER {
                 break;
             }
             self.executor.check_cancelled()?;
@@ -400,6 +411,22 @@ mod tests {
             found,
             Some(ResponseHypothesis::Camera(CameraResponse::Srgb))
         );
+    }
+
+    #[test]
+    fn compressed_highlights_are_found() {
+        for slope in [1.3, 2.0] {
+            let found = response(|measurements| {
+                change_samples(measurements, |y| slope * y / (1.0 + (slope - 1.0) * y));
+            });
+            let Some(ResponseHypothesis::Camera(CameraResponse::Compression(found))) = found else {
+                panic!("{found:?}");
+            };
+            assert!(
+                (found / f64::from(slope) - 1.0).abs() < 0.02,
+                "{found} of {slope}"
+            );
+        }
     }
 
     #[test]

@@ -83,14 +83,22 @@ fn a_single_exposure_is_corrected_and_the_others_are_not() {
     }
 }
 
-/// A capture whose pictures are shifted, with the cubic convolution of Keys (1981) at the places of the shift.
-fn shift_pictures(measurements: &mut Measurements, shift: impl Fn(usize) -> [f64; 2]) {
-    let Extent { width, height } = measurements.camera;
-    let kernel = |x: f64| match x.abs() {
+/// The cubic convolution of Keys (1981).
+fn keys(x: f64) -> f64 {
+    match x.abs() {
         x if x < 1.0 => 1.5 * x.powi(3) - 2.5 * x * x + 1.0,
         x if x < 2.0 => -0.5 * x.powi(3) + 2.5 * x * x - 4.0 * x + 2.0,
         _ => 0.0,
-    };
+    }
+}
+
+/// Shifts the pictures of a capture, with an interpolation kernel at the places of the shift.
+fn shift_pictures(
+    measurements: &mut Measurements,
+    kernel: impl Fn(f64) -> f64,
+    shift: impl Fn(usize) -> [f64; 2],
+) {
+    let Extent { width, height } = measurements.camera;
     for (l, photo) in measurements.photos.iter_mut().enumerate() {
         let (picture, [dx, dy]) = (photo.clone(), shift(l));
         for (n, sample) in photo.iter_mut().enumerate() {
@@ -122,7 +130,7 @@ fn a_camera_that_trembles_is_followed() {
     }
     let clean = SyntheticCapture::smooth(PATTERNS).measurements;
     let mut capture = SyntheticCapture::smooth(PATTERNS);
-    shift_pictures(&mut capture.measurements, |l| shifts[l]);
+    shift_pictures(&mut capture.measurements, keys, |l| shifts[l]);
     let photometry = photometry_of(&capture);
     assert!(photometry.faults.is_empty(), "{:?}", photometry.faults);
     for (l, correction) in photometry.corrections.iter().enumerate() {
@@ -158,10 +166,26 @@ fn a_camera_that_trembles_is_followed() {
 }
 
 #[test]
+fn pictures_interpolate_as_softly_as_their_shifts_show() {
+    let softness = |kernel: fn(f64) -> f64| {
+        let mut random = uniform(7);
+        let mut capture = SyntheticCapture::with_variation(PATTERNS, 0.1);
+        let shifts: Vec<[f64; 2]> = (0..PATTERNS)
+            .map(|_| [0.6 * random(), 0.6 * random()])
+            .collect();
+        shift_pictures(&mut capture.measurements, kernel, |l| shifts[l]);
+        photometry_of(&capture).softness
+    };
+    let (cubic, line) = (softness(keys), softness(|x| (1.0 - x.abs()).max(0.0)));
+    assert!(cubic < 0.4, "{cubic}");
+    assert!(line > cubic + 0.2, "{cubic} {line}");
+}
+
+#[test]
 fn photographs_after_a_move_are_left_out() {
     let mut capture = SyntheticCapture::smooth(PATTERNS);
     let after = 24;
-    shift_pictures(&mut capture.measurements, |l| {
+    shift_pictures(&mut capture.measurements, keys, |l| {
         if l < after { [0.0; 2] } else { [0.5, -0.3] }
     });
     let faults = photometry_of(&capture).faults;
@@ -230,6 +254,34 @@ fn noisy_exposures_of_one_pattern_are_no_outliers() {
         }
     });
     assert!(photometry.faults.is_empty(), "{photometry:?}");
+}
+
+#[test]
+fn flicker_is_found_along_the_axis_of_the_shutter() {
+    let flicker = |amplitude: f32, is_turned: bool| {
+        let mut capture = SyntheticCapture::with_variation(PATTERNS, 0.1);
+        let width = capture.measurements.camera.width as usize;
+        let mut random = uniform(3);
+        for l in 0..PATTERNS {
+            let phase = random() as f32;
+            replace(&mut capture.measurements, l, |n, _, y| {
+                let row = if is_turned { n % width } else { n / width };
+                let periods = 3.0 * row as f32 / width as f32 + phase;
+                y * (1.0 + amplitude * (std::f32::consts::TAU * periods).sin())
+            });
+        }
+        let photometry = photometry_of(&capture);
+        assert!(photometry.faults.is_empty(), "{photometry:?}");
+        let used: Vec<usize> = (0..PATTERNS).collect();
+        let input = photometry.resampling_input(&capture.measurements, &capture.geometry, &used);
+        find_flicker(input, &SequentialExecutor)
+    };
+    assert_eq!(flicker(0.0, false), None);
+    for is_turned in [false, true] {
+        let found = flicker(0.02, is_turned).unwrap();
+        assert_eq!(found.is_along_rows, is_turned);
+        assert!((found.amplitude - 0.02).abs() < 0.005, "{found:?}");
+    }
 }
 
 #[test]

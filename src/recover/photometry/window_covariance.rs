@@ -21,6 +21,9 @@ pub(super) const UNEXPLAINED_VARIANCE: f64 = 1e-5;
 /// more noise than that say less.
 pub(super) const MODEL_VARIANCE: f64 = 0.01;
 
+/// Steps of one camera pixel to the right and down.
+pub(super) const AXES: [(u32, u32); 2] = [(1, 0), (0, 1)];
+
 /// What the model says of the photographs of a list at one window.
 pub(super) struct WindowModel {
     /// `m`, `[L]`.
@@ -151,10 +154,10 @@ impl WindowModel {
             let unit = weight / brightness;
             y.iter_mut().for_each(|y| *y *= unit);
             noise.iter_mut().for_each(|noise| *noise *= weight * weight);
-            let gradients = [(1, 0), (0, 1)].map(|step| {
+            let gradients = AXES.map(|step| {
                 let gradient = |&l: &usize| {
                     let sample = |pixel| measurements.sample(l, pixel, c);
-                    unit * gradient(measurements.camera, sample, pixel, step)
+                    unit * differences(measurements.camera, sample, pixel, step)[0]
                 };
                 pattern_indices.iter().map(gradient).collect()
             });
@@ -209,30 +212,21 @@ impl WindowModel {
     }
 }
 
-/// Half the difference of samples beside a pixel, along `(x, y)`; zero if one is not measured.
-fn gradient(
+/// First and second difference of samples at a pixel along `step`, per camera pixel; zero where a neighbour is not measured.
+pub(super) fn differences(
     camera: Extent,
     sample: impl Fn(CameraPixel) -> f64,
     CameraPixel { x, y }: CameraPixel,
     (dx, dy): (u32, u32),
-) -> f64 {
+) -> [f64; 2] {
     if x < dx || y < dy || x + dx >= camera.width || y + dy >= camera.height {
-        return 0.0;
+        return [0.0; 2];
     }
     let sample = |x: u32, y: u32| sample(CameraPixel { x, y });
-    let difference = sample(x + dx, y + dy) - sample(x - dx, y - dy);
-    if difference.is_nan() {
-        0.0
-    } else {
-        0.5 * difference
+    let (before, after) = (sample(x - dx, y - dy), sample(x + dx, y + dy));
+    let differences = [0.5 * (after - before), before + after - 2.0 * sample(x, y)];
+    match differences[0].is_nan() {
+        true => [0.0; 2],
+        false => differences,
     }
-}
-
-/// Gradient of samples at a pixel, per camera pixel to the right and down.
-pub(super) fn gradients(
-    camera: Extent,
-    sample: impl Fn(CameraPixel) -> f64,
-    pixel: CameraPixel,
-) -> [f64; 2] {
-    [(1, 0), (0, 1)].map(|step| gradient(camera, &sample, pixel, step))
 }

@@ -1,0 +1,208 @@
+//! Hot and dead pixels of the sensor: their samples are filled from their neighbours.
+//!
+//! A pixel is hot if it is saturated in nearly all photographs, and neither of its neighbours in the row is. It is dead if it
+//! has one code in all photographs, and both of its neighbours receive light: lead between panes of glass receives none
+//! either, but its codes vary by the read noise. Only rows are compared, so that a row is filled alike whatever other rows
+//! are loaded.
+
+use std::ops::AddAssign;
+
+use super::measurements::Measurements;
+use crate::transport::CHANNELS;
+
+/// Share of the photographs that saturate a hot pixel, at least, and its neighbours, at most.
+const MIN_HOT_SHARE: f64 = 0.9;
+const MAX_NEIGHBOUR_SHARE: f64 = 0.1;
+/// Fewest photographs in which a dead pixel has one code.
+const MIN_DEAD_PHOTOGRAPHS: usize = 8;
+/// Standard deviation of the read noise, by the distance of the codes, below which a pixel without light may have one code
+/// in all photographs, too.
+const MIN_READ_NOISE: f64 = 0.5;
+/// Standard deviations of the read noise that neighbours of a dead pixel exceed on the average of all photographs.
+const MIN_NEIGHBOUR_LIGHT: f64 = 10.0;
+
+/// Numbers of pixels whose samples are filled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DefectivePixels {
+    /// Those that are saturated in nearly all photographs.
+    pub hot: usize,
+    /// Those that have one code in all photographs.
+    pub dead: usize,
+}
+
+impl AddAssign for DefectivePixels {
+    fn add_assign(&mut self, other: Self) {
+        self.hot += other.hot;
+        self.dead += other.dead;
+    }
+}
+
+impl Measurements {
+    /// Replaces the samples of hot pixels by the means of their neighbours in the row. Returns their number.
+    pub fn fill_hot_pixels(&mut self) -> usize {
+        let is_hot = |row: &PixelRow<f64>, x: usize, neighbours: [usize; 2]| {
+            let [a, b] = neighbours.map(|x| row.values[x]);
+            row.values[x] >= MIN_HOT_SHARE && a.max(b) <= MAX_NEIGHBOUR_SHARE
+        };
+        self.fill_pixels(Self::saturated_share, is_hot)
+    }
+
+    /// Replaces the samples of dead pixels by the means of their neighbours in the row; codes are `quantum` apart. Returns
+    /// their number.
+    pub fn fill_dead_pixels(&mut self, quantum: f64) -> usize {
+        let read_noise = self.noise.floor.map(f64::sqrt);
+        if read_noise
+            .iter()
+            .any(|noise| *noise < MIN_READ_NOISE * quantum)
+        {
+            return 0;
+        }
+        let is_dead = |row: &PixelRow<bool>, x: usize, neighbours: [usize; 2]| {
+            let is_lit = |n: usize| {
+                (0..CHANNELS)
+                    .any(|c| row.measurements.mean(n, c) > MIN_NEIGHBOUR_LIGHT * read_noise[c])
+            };
+            row.values[x] && neighbours.iter().all(|&x| is_lit(row.start + x))
+        };
+        self.fill_pixels(Self::has_one_code, is_dead)
+    }
+
+    /// Fills the pixels of which `is_defective` holds, given their row with a value of each pixel, their column and those
+    /// of their neighbours. Returns their number.
+    fn fill_pixels<V>(
+        &mut self,
+        value: impl Fn(&Self, usize) -> V,
+        is_defective: impl Fn(&PixelRow<'_, V>, usize, [usize; 2]) -> bool,
+    ) -> usize {
+        let width = self.camera.width as usize;
+        if width < 2 {
+            return 0;
+        }
+        // At the border there is one neighbour.
+        let neighbours = |x: usize| match x {
+            0 => [1, 1],
+            x if x + 1 == width => [x - 1, x - 1],
+            x => [x - 1, x + 1],
+        };
+        let mut filled = 0;
+        for start in (0..self.rows.count()).map(|row| row * width) {
+            let row = PixelRow {
+                measurements: self,
+                start,
+                values: (start..start + width).map(|n| value(self, n)).collect(),
+            };
+            let defective = (0..width).filter(|&x| is_defective(&row, x, neighbours(x)));
+            for x in defective.collect::<Vec<_>>() {
+                let [a, b] = neighbours(x).map(|x| start + x);
+                for photo in &mut self.photos {
+                    photo[start + x] = std::array::from_fn(|c| 0.5 * (photo[a][c] + photo[b][c]));
+                }
+                filled += 1;
+            }
+        }
+        filled
+    }
+
+    /// Share of the photographs that saturate a channel of pixel `n`.
+    fn saturated_share(&self, n: usize) -> f64 {
+        let saturated = |photo: &&Vec<[f32; 3]>| photo[n].iter().any(|y| y.is_nan());
+        let count = self.photos.iter().filter(saturated).count();
+        count as f64 / self.photos.len() as f64
+    }
+
+    /// Whether pixel `n` has one code in all photographs: one measurement at each exposure.
+    fn has_one_code(&self, n: usize) -> bool {
+        let mut pairs = 0;
+        let full_scales = self.full_scale.windows(2);
+        for (photos, full_scales) in self.photos.windows(2).zip(full_scales) {
+            if full_scales[0] == full_scales[1] {
+                if photos[0][n] != photos[1][n] {
+                    return false;
+                }
+                pairs += 1;
+            }
+        }
+        pairs + 1 >= MIN_DEAD_PHOTOGRAPHS
+    }
+
+    /// Mean of the samples of pixel `n` that are not saturated, in channel `c`.
+    fn mean(&self, n: usize, c: usize) -> f64 {
+        let samples = self.photos.iter().map(|photo| f64::from(photo[n][c]));
+        let samples = samples.filter(|y| !y.is_nan());
+        let (sum, count) = samples.fold((0.0, 0.0), |(sum, count), y| (sum + y, count + 1.0));
+        sum / f64::max(count, 1.0)
+    }
+}
+
+/// A row of pixels, with a value of each.
+struct PixelRow<'a, V> {
+    measurements: &'a Measurements,
+    /// Index of its first pixel.
+    start: usize,
+    values: Vec<V>,
+}
+
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod tests {
+    use crate::recover::test_problems::SyntheticCapture;
+
+    #[test]
+    fn hot_pixels_are_filled_and_no_others() {
+        let mut measurements = SyntheticCapture::smooth(12).measurements;
+        let clean = measurements.photos.clone();
+        assert_eq!(measurements.fill_hot_pixels(), 0);
+        assert_eq!(measurements.photos, clean);
+        let (hot, corner) = (5 * 32 + 7, 31 * 32 + 31);
+        for photo in &mut measurements.photos {
+            photo[hot] = [f32::NAN; 3];
+            photo[corner] = [f32::NAN; 3];
+        }
+        assert_eq!(measurements.fill_hot_pixels(), 2);
+        for (photo, clean) in measurements.photos.iter().zip(&clean) {
+            for n in 0..clean.len() {
+                let expected = match n {
+                    n if n == hot => 0.5 * (clean[n - 1][1] + clean[n + 1][1]),
+                    n if n == corner => clean[n - 1][1],
+                    n => clean[n][1],
+                };
+                assert!((photo[n][1] - expected).abs() < 1e-6, "pixel {n}");
+            }
+        }
+        // A saturated area is no defect.
+        for photo in &mut measurements.photos {
+            photo[40..50].fill([f32::NAN; 3]);
+        }
+        assert_eq!(measurements.fill_hot_pixels(), 0);
+    }
+
+    #[test]
+    fn dead_pixels_are_filled_unless_the_read_noise_cannot_tell_them() {
+        const QUANTUM: f64 = 1e-5;
+        let mut measurements = SyntheticCapture::smooth(12).measurements;
+        measurements.noise.floor = [QUANTUM * QUANTUM; 3];
+        // The last two photographs have another exposure, of which one code is another measurement.
+        measurements.full_scale[10..].fill(2.0);
+        let clean = measurements.photos.clone();
+        assert_eq!(measurements.fill_dead_pixels(QUANTUM), 0);
+        let (dead, dark) = (5 * 32 + 7, 9 * 32 + 7);
+        for (l, photo) in measurements.photos.iter_mut().enumerate() {
+            photo[dead] = [if l < 10 { -0.001 } else { -0.0005 }; 3];
+            // Without light, samples vary.
+            photo[dark] = [1e-5 * (l % 2) as f32; 3];
+        }
+        let coarse = measurements.clone().fill_dead_pixels(3.0 * QUANTUM);
+        assert_eq!(coarse, 0);
+        assert_eq!(measurements.fill_dead_pixels(QUANTUM), 1);
+        for (photo, clean) in measurements.photos.iter().zip(&clean) {
+            let expected = 0.5 * (clean[dead - 1][1] + clean[dead + 1][1]);
+            assert!((photo[dead][1] - expected).abs() < 1e-6);
+            assert!(photo[dark][1] < 2e-5);
+        }
+        // Beside lead, a pixel without light is none.
+        for photo in &mut measurements.photos {
+            photo[dead - 1] = [0.0; 3];
+            photo[dead] = [0.0; 3];
+        }
+        assert_eq!(measurements.fill_dead_pixels(QUANTUM), 0);
+    }
+}
