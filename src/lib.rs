@@ -8,6 +8,7 @@
 //!
 //! | module | from | to | feature |
 //! |---|---|---|---|
+//! | [`acquisition`] | a display and an object | what to show, and which photograph shows what | `simulate` |
 //! | [`simulate`] | a built-in scene | photographs with known transport | `simulate` |
 //! | [`capture`] | a capture folder | linear measurements | `capture` for files |
 //! | [`calibrate`] | photographs of Gray code | the correspondence | |
@@ -20,6 +21,8 @@
 //!
 //! `cli` (feature `cli`) and `web` (wasm32) call these modules and add no algorithms.
 
+#[cfg(feature = "simulate")]
+pub mod acquisition;
 mod bisect;
 pub mod calibrate;
 pub mod capture;

@@ -4,6 +4,7 @@
 //! [`advice`] adds the remedy.
 
 mod advice;
+mod assemble;
 mod capture_writer;
 mod evaluate;
 mod inspect;
@@ -11,6 +12,7 @@ mod ltm_file;
 mod measurement_reader;
 mod output_file;
 mod output_folder;
+mod patterns;
 mod photograph;
 mod process_resources;
 mod progress;
@@ -37,6 +39,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Patterns(patterns::PatternsArgs),
+    Assemble(assemble::AssembleArgs),
     Simulate(simulate::SimulateArgs),
     Photograph(photograph::PhotographArgs),
     Recover(recover::RecoverArgs),
@@ -59,6 +63,8 @@ const DATA_ERROR_STATUS: u8 = 65;
 /// warnings with `--strict`, 130 after an interruption.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
+        Command::Patterns(args) => patterns::run(&args),
+        Command::Assemble(args) => assemble::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Photograph(args) => photograph::run(&args),
         Command::Recover(args) => recover::run(&args),

@@ -9,10 +9,13 @@ use rayon::prelude::*;
 
 use super::capture_writer::{MAX_ELECTRONS, gray_code_shot, write_png};
 use super::{output_folder, progress};
+use crate::acquisition::{PatternSequence, SEQUENCE_NAME};
 use crate::capture::{
     CaptureFolder, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, ManifestCamera, Pattern, Shot,
 };
-use crate::simulate::{Camera, GrayCodePattern, PatternImage, RandomStreamId, SessionFault};
+use crate::simulate::{
+    Camera, GrayCodePattern, PatternImage, RandomStreamId, SessionFault, emission,
+};
 use crate::transport::{CHANNELS, Extent};
 
 /// Photograph the known transport of a capture again, with faults of rigs
@@ -24,6 +27,10 @@ pub struct PhotographArgs {
     /// Capture folder to write; must be new or empty
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// Photograph the pictures of this folder, which `ltm-export patterns` wrote, in their order, instead of the capture's own
+    /// patterns; the output is a folder of numbered photographs
+    #[arg(long, value_name = "DIR")]
+    sequence: Option<PathBuf>,
     #[arg(long = "fault", value_name = "NAME[=SIZE]", help = fault_help())]
     faults: Vec<SessionFault>,
     /// Seed of noise and faults
@@ -44,6 +51,9 @@ fn fault_help() -> String {
 }
 
 pub fn run(args: &PhotographArgs) -> Result<()> {
+    if let Some(sequence) = &args.sequence {
+        return photograph_sequence(args, sequence);
+    }
     let shots = write_capture(args)?;
     eprintln!(
         "{}: {shots} shots, {} faults",
@@ -56,13 +66,101 @@ pub fn run(args: &PhotographArgs) -> Result<()> {
 /// Writes the new capture. Returns its number of shots.
 pub fn write_capture(args: &PhotographArgs) -> Result<usize> {
     let folder = CaptureFolder::open(&args.capture)?;
-    let missing =
-        "has no truth/ folder, so its transport is unknown and it cannot be photographed again";
-    let truth = folder.truth()?.context(missing);
-    let truth = truth.with_context(|| args.capture.display().to_string())?;
+    let truth = known_transport(args, &folder)?;
     let session = photograph(args, &folder, &truth)?;
     output_folder::write_atomically(&args.output, |root| session.write(&args.capture, root))?;
     Ok(session.manifest.shots.len())
+}
+
+/// Writes a photograph of each picture of the sequence in `folder`.
+fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
+    let truth = known_transport(args, &CaptureFolder::open(&args.capture)?)?;
+    let path = folder.join(SEQUENCE_NAME);
+    let read = || -> Result<PatternSequence> {
+        Ok(PatternSequence::parse(&std::fs::read_to_string(&path)?)?)
+    };
+    let sequence = read().with_context(|| path.display().to_string())?;
+    let layout = sequence.layout;
+    ensure!(
+        layout.light == truth.light_plane,
+        "{}: has {} light elements, but the transport of {} has {}",
+        path.display(),
+        layout.light,
+        args.capture.display(),
+        truth.light_plane
+    );
+    let emissions = sequence.pictures.par_iter().map(|picture| {
+        let path = folder.join(&picture.picture);
+        let read = || -> Result<Vec<f32>> {
+            let shown = image::open(&path)?.into_luma8();
+            ensure!(
+                shown.dimensions() == (layout.display.width, layout.display.height),
+                "has another size than the display, {}",
+                layout.display
+            );
+            let code = |(u, v)| {
+                shown
+                    .get_pixel(layout.centre(u, v)[0], layout.centre(u, v)[1])
+                    .0[0]
+            };
+            Ok(layout
+                .light
+                .cells()
+                .map(|cell| emission(code(cell)) as f32)
+                .collect())
+        };
+        read().with_context(|| path.display().to_string())
+    });
+    let mut emissions = emissions.collect::<Result<Vec<_>>>()?;
+    let mut random = RandomStreamId::Fault.start(args.seed);
+    for fault in &args.faults {
+        fault.change_emissions(layout.light, &mut emissions, &mut [], &mut random);
+    }
+    let channels: Vec<_> = (0..CHANNELS)
+        .map(|c| channel_pictures(&truth, c, &emissions))
+        .collect();
+    let mut pictures = interleave(&channels);
+    for fault in &args.faults {
+        fault.change_pictures(truth.camera, &mut pictures, &mut random);
+    }
+    output_folder::write_atomically(&args.output, |root| {
+        pictures
+            .par_iter()
+            .enumerate()
+            .try_for_each(|(i, picture)| {
+                let codes = expose(args, i, picture);
+                let path = root.join(format!("IMG_{:04}.png", i + 1));
+                write_png(
+                    &path,
+                    truth.camera,
+                    bytemuck::cast_slice(&codes),
+                    ExtendedColorType::Rgb16,
+                )
+            })
+    })?;
+    eprintln!("{}: {} photographs", args.output.display(), pictures.len());
+    Ok(())
+}
+
+/// The known transport of the capture.
+fn known_transport(args: &PhotographArgs, folder: &CaptureFolder) -> Result<GroundTruth> {
+    let missing =
+        "has no truth/ folder, so its transport is unknown and it cannot be photographed again";
+    let truth = folder.truth()?.context(missing);
+    truth.with_context(|| args.capture.display().to_string())
+}
+
+/// The codes of photograph `i`, with noise and faults.
+fn expose(args: &PhotographArgs, i: usize, picture: &LinearPhoto) -> Vec<[u16; CHANNELS]> {
+    let sensor = Camera {
+        electrons: args.electrons as f64,
+    };
+    let mut noise = RandomStreamId::Photograph(i as u32).start(args.seed);
+    let mut codes = sensor.photograph(picture, &mut noise);
+    args.faults
+        .iter()
+        .for_each(|fault| fault.change_codes(&mut codes));
+    codes
 }
 
 /// A session of photographs, in memory.
@@ -163,19 +261,10 @@ fn photograph(
     manifest.graycode = gray_code.iter().copied().map(gray_code_shot).collect();
     names.extend(manifest.graycode.iter().map(|shot| shot.photo.clone()));
     pictures.append(&mut others);
-    let sensor = Camera {
-        electrons: args.electrons as f64,
-    };
-    let expose = |(i, (name, picture)): (usize, (String, LinearPhoto))| {
-        let mut noise = RandomStreamId::Photograph(i as u32).start(args.seed);
-        let mut codes = sensor.photograph(&picture, &mut noise);
-        args.faults
-            .iter()
-            .for_each(|fault| fault.change_codes(&mut codes));
-        (name, codes)
-    };
     let named: Vec<(String, LinearPhoto)> = names.into_iter().zip(pictures).collect();
-    let photographs = named.into_par_iter().enumerate().map(expose).collect();
+    let photographs = named.into_par_iter().enumerate();
+    let photographs = photographs.map(|(i, (name, picture))| (name, expose(args, i, &picture)));
+    let photographs = photographs.collect();
     // Exposures of one pattern share its file.
     let first = |shot: &Shot| {
         let same = |other: &Shot| other.pattern == shot.pattern;

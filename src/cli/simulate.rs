@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use super::capture_writer::{MAX_ELECTRONS, gray_code_shot, write_png};
 use super::report::format_bytes;
+use super::value_parsers::parse_extent;
 use super::{output_folder, progress};
 use crate::capture::{
     MANIFEST_NAME, Manifest, ManifestCamera, ManifestLight, RELIT_FULL_SCALE, Shot,
@@ -63,19 +64,6 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "N", default_value_t = 40_000,
           value_parser = clap::value_parser!(u64).range(1..=MAX_ELECTRONS))]
     electrons: u64,
-}
-
-/// Parses `WxH` with both sides in the range `sides`.
-fn parse_extent(text: &str, sides: RangeInclusive<u32>) -> Result<Extent, String> {
-    let (min, max) = (sides.start(), sides.end());
-    let side = |s: &str| {
-        let side = s.parse().ok().filter(|n| sides.contains(n));
-        side.ok_or_else(|| format!("each side must be between {min} and {max}"))
-    };
-    let (width, height) = text
-        .split_once('x')
-        .ok_or("give it as WIDTHxHEIGHT, for instance 128x128")?;
-    Ok(Extent::new(side(width)?, side(height)?))
 }
 
 pub fn run(args: &SimulateArgs) -> Result<()> {

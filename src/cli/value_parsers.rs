@@ -1,8 +1,11 @@
 //! What several commands' arguments share: wrong combinations, numbers in a range, amounts of bytes.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use clap::ValueEnum;
+
+use crate::transport::Extent;
 
 /// A wrong combination of options that are valid on their own.
 #[derive(Debug, thiserror::Error)]
@@ -15,6 +18,19 @@ pub fn parse_number(text: &str, min: f32, max: f32) -> Result<f32, String> {
         Ok(number) if (min..=max).contains(&number) => Ok(number),
         _ => Err(format!("it must be a number from {min} to {max}")),
     }
+}
+
+/// Parses `WxH` with both sides in the range `sides`.
+pub fn parse_extent(text: &str, sides: RangeInclusive<u32>) -> Result<Extent, String> {
+    let (min, max) = (sides.start(), sides.end());
+    let side = |s: &str| {
+        let side = s.parse().ok().filter(|n| sides.contains(n));
+        side.ok_or_else(|| format!("each side must be between {min} and {max}"))
+    };
+    let (width, height) = text
+        .split_once('x')
+        .ok_or("give it as WIDTHxHEIGHT, for instance 128x128")?;
+    Ok(Extent::new(side(width)?, side(height)?))
 }
 
 /// The name of an option's value, as on the command line.

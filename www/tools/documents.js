@@ -31,6 +31,7 @@ export const DOCUMENT_GROUPS = [
   {
     title: 'Make photographs',
     entries: [
+      ['docs/shooting.md', 'From a display to a capture'],
       ['docs/capture.md', 'The capture folder'],
       ['docs/cli.md', 'ltm-export'],
       ['docs/results.md', 'Accuracy'],

@@ -90,7 +90,7 @@ pub(in crate::recover) async fn estimate(
     let mut readmission_steps = 0;
     let max_outliers = (MAX_OUTLIER_SHARE * count as f64) as usize;
     let (mut steps, mut shift_steps) = (0, 0);
-    // What is unexplained with each of the softnesses that were tried.
+    // Unexplained shares with the softnesses that were tried.
     let (mut softness_shares, mut tried_softnesses) = ([0.0; 3], 0);
     let last = loop {
         preparation.executor.check_cancelled()?;

@@ -1,0 +1,17 @@
+//! Acquisition of photographs: what a display shows, in order, and which photograph shows what.
+//!
+//! [`PatternSequence`] lists the pictures of a session: dark, flood, grey ramp, Gray code, and patterns with reference floods
+//! in between. [`DisplayLayout`] enlarges light elements to whole pixels of the display. [`SessionPlan`] says what the numbers
+//! mean for an object. [`SequenceBrightness`] checks that photographs are in the order of their pictures.
+
+mod display_layout;
+mod sequence;
+mod sequence_brightness;
+mod session_plan;
+
+pub use display_layout::{DisplayLayout, DisplayLayoutError};
+pub use sequence::{
+    PatternSequence, PictureRole, SEQUENCE_NAME, SequenceError, SequencePicture, SequenceSettings,
+};
+pub use sequence_brightness::{PairingFault, SequenceBrightness};
+pub use session_plan::{SessionPlan, SessionSetup};

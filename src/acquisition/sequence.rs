@@ -1,0 +1,327 @@
+//! The pictures that a display shows in a session, in order.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::display_layout::DisplayLayout;
+use crate::calibrate::LightPlaneAxis;
+use crate::capture::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
+use crate::simulate::{
+    GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, RandomStreamId,
+};
+use crate::transport::Extent;
+
+/// File name of a sequence.
+pub const SEQUENCE_NAME: &str = "sequence.json";
+/// Codes of the grey ramp. Black and white are the dark and the flood photograph.
+const RAMP_CODES: [u8; 8] = [16, 32, 64, 96, 128, 160, 192, 224];
+/// Patterns between two reference floods.
+const REFERENCE_INTERVAL: u32 = 10;
+
+/// The role of a picture.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "role", rename_all = "kebab-case")]
+pub enum PictureRole {
+    /// No element is lit: stray light and the sensor's black.
+    Dark,
+    /// All elements are lit.
+    Flood,
+    /// All elements have this code: the display's response.
+    Ramp {
+        /// The code.
+        code: u8,
+    },
+    /// A bit of the Gray code: the correspondence.
+    GrayCode {
+        /// Whether it numbers columns or rows.
+        axis: LightPlaneAxis,
+        /// Bit number, 0 the least significant.
+        bit: u32,
+        /// Whether dark and bright are exchanged.
+        inverted: bool,
+    },
+    /// A random pattern.
+    Pattern {
+        /// File with a pixel for each light element.
+        pattern: String,
+    },
+    /// All elements are lit once more: how far the lamp has drifted.
+    Reference,
+}
+
+/// A picture of the sequence.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SequencePicture {
+    /// File with a pixel for each pixel of the display.
+    pub picture: String,
+    /// File that its photograph becomes.
+    pub photo: String,
+    /// Its role.
+    #[serde(flatten)]
+    pub role: PictureRole,
+}
+
+/// What a sequence is made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SequenceSettings {
+    /// The light plane on the display.
+    pub layout: DisplayLayout,
+    /// Number of random patterns.
+    pub patterns: u32,
+    /// Their distribution.
+    pub ensemble: PatternEnsemble,
+    /// Seed of their random numbers.
+    pub seed: u64,
+}
+
+/// `sequence.json`, version 1: the pictures in the order in which they are shown. Paths are relative to its folder.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PatternSequence {
+    /// Always 1.
+    pub version: u32,
+    /// The light plane on the display.
+    pub layout: DisplayLayout,
+    /// The pictures.
+    pub pictures: Vec<SequencePicture>,
+}
+
+/// Why a file is no sequence.
+#[derive(Debug, Error)]
+pub enum SequenceError {
+    /// It is not JSON, or lacks a field.
+    #[error("is not a pattern sequence: {0}")]
+    Json(#[from] serde_json::Error),
+    /// It has another version.
+    #[error("has version {0}; this program reads version 1")]
+    Version(u32),
+    /// There are no patterns.
+    #[error("\"pictures\" has no random patterns")]
+    NoPatterns,
+}
+
+impl PatternSequence {
+    /// Lists the pictures, and draws them: codes of the light elements, `[M]`, one list for each picture.
+    pub fn draw(settings: &SequenceSettings) -> (Self, Vec<Vec<u8>>) {
+        let light = settings.layout.light;
+        let mut sequence = Self {
+            version: 1,
+            layout: settings.layout,
+            pictures: Vec::new(),
+        };
+        let mut drawn = Vec::new();
+        let mut show = |role: PictureRole, codes: Vec<u8>| {
+            sequence.add(role);
+            drawn.push(codes);
+        };
+        let uniform = |code: u8| vec![code; light.area()];
+        show(PictureRole::Dark, uniform(0));
+        show(PictureRole::Flood, uniform(u8::MAX));
+        for code in RAMP_CODES {
+            show(PictureRole::Ramp { code }, uniform(code));
+        }
+        for pattern in GrayCodePattern::all(light) {
+            let GrayCodePattern {
+                axis,
+                bit,
+                inverted,
+            } = pattern;
+            let role = PictureRole::GrayCode {
+                axis,
+                bit,
+                inverted,
+            };
+            show(role, grey_codes(pattern.codes(light)));
+        }
+        for i in 0..settings.patterns {
+            if i > 0 && i % REFERENCE_INTERVAL == 0 {
+                show(PictureRole::Reference, uniform(u8::MAX));
+            }
+            let mut stream = RandomStreamId::Pattern(i).start(settings.seed);
+            let pattern = format!("patterns/{i:04}.png");
+            let codes = grey_codes(settings.ensemble.draw(light, &mut stream));
+            show(PictureRole::Pattern { pattern }, codes);
+        }
+        show(PictureRole::Reference, uniform(u8::MAX));
+        (sequence, drawn)
+    }
+
+    fn add(&mut self, role: PictureRole) {
+        let of_role = |picture: &&SequencePicture| {
+            std::mem::discriminant(&picture.role) == std::mem::discriminant(&role)
+        };
+        let i = self.pictures.iter().filter(of_role).count();
+        let (folder, name) = match &role {
+            PictureRole::Dark => ("photos", "dark".to_owned()),
+            PictureRole::Flood => ("photos", "flood".to_owned()),
+            PictureRole::Ramp { code } => ("photos", format!("ramp-{code:03}")),
+            PictureRole::Reference => ("photos", format!("reference-{i:04}")),
+            PictureRole::Pattern { .. } => ("photos", format!("{i:04}")),
+            PictureRole::GrayCode {
+                axis,
+                bit,
+                inverted,
+            } => {
+                let sign = if *inverted { 'n' } else { 'p' };
+                ("graycode", format!("{axis}{bit}{sign}"))
+            }
+        };
+        let label = match &role {
+            PictureRole::Pattern { .. } => format!("pattern-{name}"),
+            PictureRole::GrayCode { .. } => format!("graycode-{name}"),
+            _ => name.clone(),
+        };
+        self.pictures.push(SequencePicture {
+            picture: format!("display/{:04}-{label}.png", self.pictures.len()),
+            photo: format!("{folder}/{name}.png"),
+            role,
+        });
+    }
+
+    /// Parses `json`.
+    ///
+    /// # Errors
+    /// If it is not a sequence of version 1 with patterns.
+    pub fn parse(json: &str) -> Result<Self, SequenceError> {
+        #[derive(Deserialize)]
+        struct VersionOnly {
+            version: u32,
+        }
+        let VersionOnly { version } = serde_json::from_str(json)?;
+        if version != 1 {
+            return Err(SequenceError::Version(version));
+        }
+        let sequence: Self = serde_json::from_str(json)?;
+        let is_pattern =
+            |picture: &SequencePicture| matches!(picture.role, PictureRole::Pattern { .. });
+        match sequence.pictures.iter().any(is_pattern) {
+            true => Ok(sequence),
+            false => Err(SequenceError::NoPatterns),
+        }
+    }
+
+    /// The manifest of the capture folder that the photographs make; `response` is that of the display, if the ramp shows
+    /// it.
+    pub fn manifest(&self, camera: ManifestCamera, response: Option<Vec<[f64; 2]>>) -> Manifest {
+        let Extent { width, height } = self.layout.light;
+        let gamma = match response {
+            Some(_) => None,
+            None => Some(MONITOR_GAMMA),
+        };
+        let mut manifest = Manifest {
+            version: 1,
+            light: ManifestLight {
+                width,
+                height,
+                gamma,
+                response,
+                ..ManifestLight::default()
+            },
+            camera,
+            ..Manifest::default()
+        };
+        for SequencePicture { photo, role, .. } in &self.pictures {
+            let photo = photo.clone();
+            match role {
+                PictureRole::Dark => manifest.dark = Some(photo),
+                PictureRole::Flood => manifest.flood = Some(photo),
+                PictureRole::Ramp { .. } | PictureRole::Reference => {}
+                PictureRole::GrayCode {
+                    axis,
+                    bit,
+                    inverted,
+                } => manifest.graycode.push(GrayCodeShot {
+                    photo,
+                    axis: *axis,
+                    bit: *bit,
+                    inverted: *inverted,
+                }),
+                PictureRole::Pattern { pattern } => manifest.shots.push(Shot {
+                    pattern: pattern.clone(),
+                    photo,
+                    exposure: None,
+                }),
+            }
+        }
+        manifest
+    }
+}
+
+/// The codes of a pattern that is the same for all primaries.
+fn grey_codes(image: PatternImage) -> Vec<u8> {
+    match image {
+        PatternImage::Grey(codes) => codes,
+        PatternImage::Rgb(codes) => codes.into_iter().map(|[red, ..]| red).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings() -> SequenceSettings {
+        let light = Extent::new(12, 8);
+        SequenceSettings {
+            layout: DisplayLayout::new(Extent::new(120, 90), light, None).unwrap(),
+            patterns: 25,
+            ensemble: PatternEnsemble::Bernoulli,
+            seed: 7,
+        }
+    }
+
+    #[test]
+    fn a_sequence_has_calibration_first_and_a_reference_after_every_ten_patterns() {
+        let (sequence, drawn) = PatternSequence::draw(&settings());
+        // 4 bits of the columns and 3 of the rows, each with its inverse.
+        assert_eq!(sequence.pictures.len(), 2 + 8 + 14 + 25 + 3);
+        assert_eq!(drawn.len(), sequence.pictures.len());
+        assert_eq!(sequence.pictures[0].role, PictureRole::Dark);
+        let references = sequence.pictures.iter().enumerate();
+        let references = references.filter(|(_, p)| p.role == PictureRole::Reference);
+        let places: Vec<usize> = references.map(|(i, _)| i - 24).collect();
+        assert_eq!(places, [10, 21, 27]);
+        assert_eq!(
+            drawn[24].iter().filter(|&&c| c == 0 || c == 255).count(),
+            96
+        );
+        let last = sequence.pictures.last().unwrap();
+        assert_eq!(last.picture, "display/0051-reference-0002.png");
+        assert_eq!(last.photo, "photos/reference-0002.png");
+    }
+
+    #[test]
+    fn a_sequence_is_read_as_it_is_written() {
+        let (sequence, _) = PatternSequence::draw(&settings());
+        let json = serde_json::to_string(&sequence).unwrap();
+        assert_eq!(PatternSequence::parse(&json).unwrap(), sequence);
+        for (json, part) in [
+            ("{}", "missing field `version`"),
+            (r#"{"version": 2}"#, "version 2"),
+            (
+                &json.replace("\"pattern\"", "\"flood\""),
+                "no random patterns",
+            ),
+        ] {
+            let error = PatternSequence::parse(json).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn the_manifest_lists_what_recovery_needs() {
+        let (sequence, _) = PatternSequence::draw(&settings());
+        let camera = ManifestCamera {
+            width: 30,
+            height: 20,
+            black: 0.0,
+            white: 65535.0,
+            ..ManifestCamera::default()
+        };
+        let manifest = sequence.manifest(camera, None);
+        let json = serde_json::to_string(&manifest).unwrap();
+        let parsed = Manifest::parse(&json, std::path::Path::new("capture.json")).unwrap();
+        assert_eq!((parsed.shots.len(), parsed.graycode.len()), (25, 14));
+        assert_eq!(parsed.shots[3].pattern, "patterns/0003.png");
+        assert_eq!(parsed.flood.as_deref(), Some("photos/flood.png"));
+        assert_eq!(parsed.light.gamma, Some(MONITOR_GAMMA));
+    }
+}

@@ -1,0 +1,419 @@
+//! `ltm-export assemble`: pairs photographs with the pictures of a sequence, and makes a capture folder of them.
+
+mod photograph_file;
+mod photograph_list;
+
+use std::path::{Component, Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
+use image::ExtendedColorType;
+use rayon::prelude::*;
+use tempfile::TempDir;
+
+use self::photograph_file::{DevelopSettings, DevelopedPhotograph, develop};
+use super::advice::error_with_remedy;
+use super::capture_writer::write_png;
+use super::process_resources::InterruptibleCores;
+use super::progress;
+use super::value_parsers::UsageError;
+use crate::acquisition::{
+    PairingFault, PatternSequence, PictureRole, SEQUENCE_NAME, SequenceBrightness, SequencePicture,
+};
+use crate::capture::{CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME};
+use crate::job_executor::Executor;
+use crate::transport::{Extent, TileRect};
+
+/// Rows of the Gray code that are decoded, at most.
+const GRAY_CODE_ROWS: u32 = 64;
+/// Most faults that are listed.
+const MAX_LISTED: usize = 5;
+/// Share of the samples of the flood photograph that may be saturated.
+const MAX_SATURATED: f64 = 0.001;
+/// Brightness of the brightest part of the flood photograph, relative to white, below which noise is needlessly high.
+const MIN_FLOOD: f64 = 0.3;
+/// Change of the reference photographs' brightness that is worth a note.
+const MIN_DRIFT: f64 = 0.005;
+/// Brightness relative to the flood's, at most, of parts of the picture that do not count for the display's response.
+const MIN_RAMP_BRIGHTNESS: f64 = 0.2;
+
+/// Pair photographs with the pictures of a sequence, and make a capture folder of them
+#[derive(Debug, Args)]
+pub struct AssembleArgs {
+    /// Folder that `ltm-export patterns` wrote
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Photographs in the order in which they were taken, or a folder of them, which is sorted by name: PNG or TIFF of 16
+    /// bits, linear
+    #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
+    photos: Vec<PathBuf>,
+    /// Tone curve of the photographs: linear, srgb, or gamma=2.2; must be given for 8 bits [default: linear]
+    #[arg(long, value_name = "CURVE", value_parser = parse_response)]
+    response: Option<CameraResponse>,
+    /// Code without light, as of 16 bits
+    #[arg(long, value_name = "CODE", default_value_t = 0)]
+    black: u16,
+    /// Code of saturated samples, as of 16 bits
+    #[arg(long, value_name = "CODE", default_value_t = 65_535)]
+    white: u16,
+    /// Average squares of N x N pixels
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
+    bin: u32,
+    /// Keep a part of the picture, in pixels before averaging
+    #[arg(long, value_name = "X,Y,WxH", value_parser = parse_rect)]
+    crop: Option<TileRect>,
+    /// Write the capture although photographs seem not to show their pictures
+    #[arg(long)]
+    force: bool,
+}
+
+fn parse_response(text: &str) -> Result<CameraResponse, String> {
+    match text {
+        "linear" => Ok(CameraResponse::Linear),
+        "srgb" => Ok(CameraResponse::Srgb),
+        _ => {
+            let gamma = text.strip_prefix("gamma=").and_then(|n| n.parse().ok());
+            let gamma = gamma.filter(|gamma| (0.1..=10.0).contains(gamma));
+            gamma
+                .map(CameraResponse::Gamma)
+                .ok_or_else(|| "give linear, srgb, or gamma=N with N from 0.1 to 10".to_owned())
+        }
+    }
+}
+
+fn parse_rect(text: &str) -> Result<TileRect, String> {
+    let parse = || {
+        let (x, rest) = text.split_once(',')?;
+        let (y, size) = rest.split_once(',')?;
+        let (width, height) = size.split_once('x')?;
+        let number = |text: &str| text.trim().parse::<u32>().ok();
+        let extent = Extent::new(
+            number(width).filter(|n| *n > 0)?,
+            number(height).filter(|n| *n > 0)?,
+        );
+        Some(TileRect {
+            x: number(x)?,
+            y: number(y)?,
+            extent,
+        })
+    };
+    parse().ok_or_else(|| "give it as X,Y,WIDTHxHEIGHT, for instance 100,50,3000x2000".to_owned())
+}
+
+pub fn run(args: &AssembleArgs) -> Result<()> {
+    if args.white <= args.black {
+        bail!(UsageError("--white must be above --black"));
+    }
+    let sequence = read_sequence(&args.folder)?;
+    ensure_new(&args.folder, &sequence)?;
+    let paths = photograph_list::photographs(&args.photos)?;
+    let settings = DevelopSettings {
+        response: args.response,
+        black: f64::from(args.black),
+        white: f64::from(args.white),
+        bin: args.bin,
+        crop: args.crop,
+    };
+    let session = Session::develop(&args.folder, sequence, paths, &settings)?;
+    let faults = session.check_pairing(args.force)?;
+    faults
+        .iter()
+        .for_each(|fault| eprintln!("warning: {fault}"));
+    session.note_exposure();
+    let response = session.display_response();
+    let manifest = session
+        .sequence
+        .manifest(settings.camera(session.extent), response);
+    session.move_into_place(&args.folder)?;
+    let path = args.folder.join(MANIFEST_NAME);
+    let json = serde_json::to_string_pretty(&manifest)?;
+    std::fs::write(&path, json + "\n").with_context(|| path.display().to_string())?;
+    if let Err(error) = check_gray_code(&args.folder) {
+        eprintln!("warning: {}", error_with_remedy(&error));
+    }
+    eprintln!(
+        "{}: {} shots of {} pixels; `ltm-export recover` takes this folder",
+        args.folder.display(),
+        manifest.shots.len(),
+        session.extent
+    );
+    Ok(())
+}
+
+fn read_sequence(folder: &Path) -> Result<PatternSequence> {
+    let path = folder.join(SEQUENCE_NAME);
+    let read = || -> Result<PatternSequence> {
+        let json = std::fs::read_to_string(&path)
+            .context("cannot be read; is this a folder that `ltm-export patterns` wrote?")?;
+        let sequence = PatternSequence::parse(&json)?;
+        for SequencePicture { photo, .. } in &sequence.pictures {
+            let is_inside = Path::new(photo)
+                .components()
+                .all(|c| matches!(c, Component::Normal(_)));
+            ensure!(
+                is_inside,
+                "\"photo\" {photo:?} is not a path inside the folder"
+            );
+        }
+        Ok(sequence)
+    };
+    read().with_context(|| path.display().to_string())
+}
+
+/// Refuses to replace what an earlier call wrote.
+fn ensure_new(folder: &Path, sequence: &PatternSequence) -> Result<()> {
+    let written = sequence
+        .pictures
+        .iter()
+        .map(|picture| picture.photo.as_str());
+    for name in std::iter::once(MANIFEST_NAME).chain(written) {
+        let path = folder.join(name);
+        ensure!(
+            !path.exists(),
+            "{}: is there already; to assemble again, delete capture.json, photos/ and graycode/",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+/// Developed photographs, in a temporary folder.
+struct Session {
+    sequence: PatternSequence,
+    paths: Vec<PathBuf>,
+    extent: Extent,
+    /// Holds the developed photographs, by their numbers.
+    developed: TempDir,
+    brightness: SequenceBrightness,
+    saturated_shares: Vec<f64>,
+}
+
+impl Session {
+    fn develop(
+        folder: &Path,
+        sequence: PatternSequence,
+        paths: Vec<PathBuf>,
+        settings: &DevelopSettings,
+    ) -> Result<Self> {
+        let developed = TempDir::with_prefix_in(".ltm-export-", folder)
+            .with_context(|| folder.display().to_string())?;
+        let cores = InterruptibleCores::listen()?;
+        let bar = progress::bar("reading", paths.len());
+        let read = |(i, path): (usize, &PathBuf)| -> Result<DevelopedPhotograph> {
+            cores.check_cancelled()?;
+            let mut photo = develop(path, settings)?;
+            let bytes = bytemuck::cast_slice(&photo.codes);
+            let target = developed.path().join(format!("{i}.png"));
+            write_png(&target, photo.extent, bytes, ExtendedColorType::Rgb16)?;
+            photo.codes = Vec::new();
+            bar.inc(1);
+            Ok(photo)
+        };
+        let photos = paths.par_iter().enumerate().map(read);
+        let photos: Vec<DevelopedPhotograph> = photos.collect::<Result<_>>()?;
+        let extent = photos
+            .first()
+            .context("--photos names no photograph")?
+            .extent;
+        if let Some(i) = photos.iter().position(|photo| photo.extent != extent) {
+            bail!(
+                "{}: has {} pixels, but {} has {extent}; photographs of one capture have one size",
+                paths[i].display(),
+                photos[i].extent,
+                paths[0].display()
+            );
+        }
+        Ok(Self {
+            sequence,
+            paths,
+            extent,
+            developed,
+            saturated_shares: photos.iter().map(|photo| photo.saturated_share).collect(),
+            brightness: SequenceBrightness {
+                thumbnails: photos.into_iter().map(|photo| photo.thumbnail).collect(),
+            },
+        })
+    }
+
+    /// The faults that `force` allows.
+    ///
+    /// # Errors
+    /// If the number of photographs is not that of the pictures, and of faults without `force`.
+    fn check_pairing(&self, force: bool) -> Result<Vec<String>> {
+        let (photos, pictures) = (self.paths.len(), self.sequence.pictures.len());
+        if photos != pictures {
+            let mut message = format!("there are {photos} photographs of {pictures} pictures");
+            if let Some(gap) = self.brightness.gap(&self.sequence) {
+                let (first, last) = (*gap.start(), *gap.end());
+                message += &match photos < pictures {
+                    true => format!(
+                        ": one is missing, of {}",
+                        range(&self.picture(first), &self.picture(last))
+                    ),
+                    false => format!(
+                        ": one is too many, {}",
+                        range(&self.path(first), &self.path(last))
+                    ),
+                };
+            }
+            bail!("{message}. Give one photograph for each picture of display/, in order");
+        }
+        let faults = self.brightness.faults(&self.sequence);
+        let texts: Vec<String> = faults
+            .iter()
+            .map(|&(i, fault)| self.fault_text(i, fault))
+            .collect();
+        if texts.is_empty() || force {
+            return Ok(texts);
+        }
+        let mut message = texts[..texts.len().min(MAX_LISTED)].join("; ");
+        if texts.len() > MAX_LISTED {
+            message += &format!("; and {} more", texts.len() - MAX_LISTED);
+        }
+        bail!("{message}. Is the order right? --force writes the capture nevertheless")
+    }
+
+    fn fault_text(&self, i: usize, fault: PairingFault) -> String {
+        let (path, picture) = (self.path(i), self.picture(i));
+        match fault {
+            PairingFault::NotDark => format!("{path} is not dark, as {picture} is"),
+            PairingFault::NotLit(relative) => format!(
+                "{path} is {relative:.2} times as bright as the flood photograph, and should be equally bright, as {picture} is"
+            ),
+            PairingFault::NotRising => {
+                format!("{path} is not between its neighbours in brightness, as {picture} is")
+            }
+            PairingFault::NotInverse(deviation) => format!(
+                "{path} is not the inverse of the photograph before, as {picture} is: their sum differs from the flood \
+                 photograph by {:.0} %",
+                100.0 * deviation
+            ),
+        }
+    }
+
+    fn path(&self, photo: usize) -> String {
+        self.paths[photo].display().to_string()
+    }
+
+    fn picture(&self, i: usize) -> String {
+        self.sequence.pictures[i].picture.clone()
+    }
+
+    /// Photographs of a role, by their numbers.
+    fn photos_of(&self, is_of_role: impl Fn(&PictureRole) -> bool) -> Vec<usize> {
+        let pictures = self.sequence.pictures.iter().enumerate();
+        let found = pictures.filter(|(_, picture)| is_of_role(&picture.role));
+        found.map(|(i, _)| i).collect()
+    }
+
+    /// Notes exposures that cost accuracy, and a lamp that drifts.
+    fn note_exposure(&self) {
+        let thumbnail = |i: &usize| &self.brightness.thumbnails[*i];
+        let mean = |i: &usize| thumbnail(i).iter().sum::<f64>() / thumbnail(i).len() as f64;
+        let floods = self.photos_of(|role| *role == PictureRole::Flood);
+        let dark: f64 = self
+            .photos_of(|role| *role == PictureRole::Dark)
+            .iter()
+            .map(mean)
+            .sum();
+        for flood in &floods {
+            let brightest = thumbnail(flood).iter().copied().fold(0.0, f64::max);
+            let saturated = self.saturated_shares[*flood];
+            if saturated > MAX_SATURATED {
+                eprintln!(
+                    "warning: {:.1} % of the samples of {} are saturated; expose less",
+                    100.0 * saturated,
+                    self.path(*flood)
+                );
+            } else if brightest < MIN_FLOOD {
+                eprintln!(
+                    "note: the brightest part of {} is at {:.0} % of white; more exposure would lower the noise",
+                    self.path(*flood),
+                    100.0 * brightest
+                );
+            }
+            let references = self.photos_of(|role| *role == PictureRole::Reference);
+            let white = mean(flood) - dark;
+            let changes = references.iter().map(|i| (mean(i) - dark) / white - 1.0);
+            let drift = changes.fold(0.0, |most: f64, change| {
+                if change.abs() > most.abs() {
+                    change
+                } else {
+                    most
+                }
+            });
+            if drift.abs() > MIN_DRIFT {
+                eprintln!(
+                    "note: the flood's brightness changed by {:+.1} % in the session; `recover` corrects the exposures",
+                    100.0 * drift
+                );
+            }
+        }
+    }
+
+    /// Pairs of code and emission that the ramp shows; `None` if they do not rise.
+    fn display_response(&self) -> Option<Vec<[f64; 2]>> {
+        let thumbnail = |i: usize| &self.brightness.thumbnails[i];
+        let [dark, flood] = [PictureRole::Dark, PictureRole::Flood]
+            .map(|role| self.photos_of(|other| *other == role).first().copied());
+        let (dark, flood) = (thumbnail(dark?), thumbnail(flood?));
+        let brightest = flood.iter().copied().fold(0.0, f64::max);
+        let parts = (0..flood.len()).filter(|&n| flood[n] > MIN_RAMP_BRIGHTNESS * brightest);
+        let light = |thumbnail: &[f64]| parts.clone().map(|n| thumbnail[n] - dark[n]).sum::<f64>();
+        let white = light(flood);
+        let mut response = vec![[0.0, 0.0]];
+        for (i, picture) in self.sequence.pictures.iter().enumerate() {
+            if let PictureRole::Ramp { code } = picture.role {
+                let emission = (light(thumbnail(i)) / white * 1e5).round() / 1e5;
+                response.push([f64::from(code), emission.max(0.0)]);
+            }
+        }
+        response.push([f64::from(u8::MAX), 1.0]);
+        let is_rising = response
+            .windows(2)
+            .all(|pair| pair[0][0] < pair[1][0] && pair[0][1] <= pair[1][1]);
+        (is_rising && response.len() > 2).then_some(response)
+    }
+
+    /// Gives the photographs the names of the sequence.
+    fn move_into_place(&self, folder: &Path) -> Result<()> {
+        for (i, picture) in self.sequence.pictures.iter().enumerate() {
+            let target = folder.join(&picture.photo);
+            let rename = || -> Result<()> {
+                if let Some(parent) = target.parent() {
+                    std::fs::create_dir_all(parent)?;
+                }
+                Ok(std::fs::rename(
+                    self.developed.path().join(format!("{i}.png")),
+                    &target,
+                )?)
+            };
+            rename().with_context(|| target.display().to_string())?;
+        }
+        Ok(())
+    }
+}
+
+/// Decodes some rows of the Gray code.
+fn check_gray_code(folder: &Path) -> Result<()> {
+    let folder = CaptureFolder::open(folder)?;
+    let _spinner = progress::spinner("decoding");
+    let dark = folder.read_dark()?;
+    let camera = folder.manifest().camera.extent();
+    let row = |i: u32| (u64::from(i) * u64::from(camera.height) / u64::from(GRAY_CODE_ROWS)) as u32;
+    let rows = (0..GRAY_CODE_ROWS.min(camera.height)).map(|i| row(i)..row(i) + 1);
+    let rows = CameraRowSet::from_strips(rows);
+    let gray_code = folder.read_gray_code(&dark, &rows)?;
+    let decoded = gray_code.correspondence(camera);
+    decoded
+        .map(|_| ())
+        .with_context(|| folder.manifest_path().display().to_string())
+}
+
+/// For instance "a", or "a to b".
+fn range(first: &str, last: &str) -> String {
+    match first == last {
+        true => first.to_owned(),
+        false => format!("{first} to {last}"),
+    }
+}

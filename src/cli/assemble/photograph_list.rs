@@ -1,0 +1,94 @@
+//! The photographs of a session, in the order in which they were taken.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+/// Extensions of files that are photographs.
+const EXTENSIONS: [&str; 3] = ["png", "tif", "tiff"];
+
+/// The files of `paths`; of a folder its PNG and TIFF files, sorted by their names with numbers by their values.
+pub fn photographs(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in paths {
+        match path.is_dir() {
+            true => files.extend(folder(path).with_context(|| path.display().to_string())?),
+            false => files.push(path.clone()),
+        }
+    }
+    Ok(files)
+}
+
+/// Whether a file has the extension of a type that can be read.
+pub fn is_photograph(path: &Path) -> bool {
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_ascii_lowercase());
+    extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str()))
+}
+
+fn folder(path: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(path)? {
+        let file = entry?.path();
+        if is_photograph(&file) && file.is_file() {
+            files.push(file);
+        }
+    }
+    ensure!(
+        !files.is_empty(),
+        "has no PNG or TIFF files; convert raw files to 16-bit linear TIFF first (docs/capture.md says how)"
+    );
+    let name = |file: &PathBuf| {
+        file.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    files.sort_by_cached_key(|file| natural_key(&name(file)));
+    Ok(files)
+}
+
+/// A name divided into parts of text, each with the number after it, so that numbers are compared by their values.
+fn natural_key(name: &str) -> Vec<(String, u128)> {
+    let is_digit = |c: char| c.is_ascii_digit();
+    let mut key = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let (text, after) = rest.split_at(rest.find(is_digit).unwrap_or(rest.len()));
+        let (number, after) = after.split_at(after.find(|c| !is_digit(c)).unwrap_or(after.len()));
+        key.push((text.to_owned(), number.parse().unwrap_or(0)));
+        rest = after;
+    }
+    key
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_a_folder_are_sorted_by_their_numbers() {
+        let folder = tempfile::TempDir::new().unwrap();
+        for name in [
+            "IMG_10.tif",
+            "IMG_9.TIF",
+            "IMG_0100.png",
+            "notes.txt",
+            "IMG_9b.tif",
+        ] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let files = photographs(&[folder.path().to_owned()]).unwrap();
+        let names = files
+            .iter()
+            .map(|file| file.file_name().unwrap().to_str().unwrap());
+        let expected = ["IMG_9.TIF", "IMG_9b.tif", "IMG_10.tif", "IMG_0100.png"];
+        assert_eq!(names.collect::<Vec<_>>(), expected);
+        let empty = tempfile::TempDir::new().unwrap();
+        assert!(photographs(&[empty.path().to_owned()]).is_err());
+        // Single files keep their order.
+        let given = ["b.png", "a.png"].map(PathBuf::from);
+        assert_eq!(photographs(&given).unwrap(), given);
+    }
+}

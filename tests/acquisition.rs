@@ -1,0 +1,383 @@
+//! From a display to a capture: `ltm-export patterns`, photographs by a simulated camera, and `ltm-export assemble`.
+#![cfg(not(target_arch = "wasm32"))]
+#![allow(clippy::unwrap_used)] // a panic fails the test
+
+mod common;
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use common::copy_folder;
+
+fn run(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
+    command.args(arguments).output().unwrap()
+}
+
+fn stderr_text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn succeed(arguments: &[&str]) -> Output {
+    let output = run(arguments);
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        stderr_text(&output)
+    );
+    output
+}
+
+/// An object, the sequence that a display shows, and its photographs.
+struct Session {
+    folder: TempDir,
+}
+
+impl Session {
+    fn new() -> Self {
+        let session = Self {
+            folder: TempDir::new().unwrap(),
+        };
+        let [object, sequence, photos] =
+            ["object", "sequence", "photos"].map(|name| session.text(name));
+        let size = ["--camera", "48x48", "--light", "24x24"];
+        succeed(
+            &[
+                &[
+                    "simulate",
+                    "stained-glass",
+                    "-o",
+                    &object,
+                    "--patterns",
+                    "1",
+                ],
+                &size[..],
+            ]
+            .concat(),
+        );
+        let display = [
+            "--screen",
+            "200x150",
+            "--light",
+            "24x24",
+            "--patterns",
+            "48",
+        ];
+        succeed(&[&["patterns", "-o", &sequence], &display[..]].concat());
+        succeed(&[
+            "photograph",
+            &object,
+            "--sequence",
+            &sequence,
+            "-o",
+            &photos,
+        ]);
+        session
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn text(&self, name: &str) -> String {
+        self.path(name).to_str().unwrap().to_owned()
+    }
+
+    /// The photograph of picture `i`.
+    fn photo(&self, i: usize) -> PathBuf {
+        self.path(&format!("photos/IMG_{:04}.png", i + 1))
+    }
+
+    fn assemble(&self, more: &[&str]) -> Output {
+        let [sequence, photos] = ["sequence", "photos"].map(|name| self.text(name));
+        let levels = ["--black", "512", "--white", "60000"];
+        run(&[
+            &["assemble", &sequence, "--photos", &photos],
+            &levels[..],
+            more,
+        ]
+        .concat())
+    }
+
+    fn refusal(&self) -> String {
+        let output = self.assemble(&[]);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(!self.path("sequence/capture.json").exists());
+        assert!(!self.path("sequence/photos").exists());
+        stderr_text(&output)
+    }
+
+    fn manifest(&self) -> Value {
+        serde_json::from_slice(&fs::read(self.path("sequence/capture.json")).unwrap()).unwrap()
+    }
+}
+
+#[test]
+fn a_session_becomes_a_capture_that_is_recovered() {
+    let session = Session::new();
+    let output = session.assemble(&[]);
+    assert!(output.status.success(), "{}", stderr_text(&output));
+    assert!(
+        !stderr_text(&output).contains("warning"),
+        "{}",
+        stderr_text(&output)
+    );
+    let manifest = session.manifest();
+    assert_eq!(manifest["shots"].as_array().unwrap().len(), 48);
+    // The display's response is measured by the ramp: that of gamma 2.2.
+    for pair in manifest["light"]["response"].as_array().unwrap() {
+        let [code, emission] = [0, 1].map(|i| pair[i].as_f64().unwrap());
+        assert!(
+            (emission - (code / 255.0).powf(2.2)).abs() < 0.005,
+            "{pair}"
+        );
+    }
+    let [capture, file] = ["sequence", "object.ltm"].map(|name| session.text(name));
+    let recovered = succeed(&[
+        "recover",
+        &capture,
+        "-o",
+        &file,
+        "--lossless",
+        "--json",
+        "--patterns",
+        "40",
+    ]);
+    let report: Value = serde_json::from_slice(&recovered.stdout).unwrap();
+    assert_eq!(report["saturated_samples"], 0);
+    // The known transport is that of the object.
+    copy_folder(
+        &session.path("object/truth"),
+        &session.path("sequence/truth"),
+    );
+    let evaluated = succeed(&["evaluate", &file, &capture, "--json"]);
+    let evaluated: Value = serde_json::from_slice(&evaluated.stdout).unwrap();
+    let snr = evaluated["snr_db"].as_f64().unwrap();
+    assert!(snr > 12.0, "{snr}");
+    let again = session.assemble(&[]);
+    assert!(
+        stderr_text(&again).contains("is there already"),
+        "{}",
+        stderr_text(&again)
+    );
+}
+
+#[test]
+fn photographs_that_do_not_fit_the_sequence_are_refused_by_name() {
+    let session = Session::new();
+    let hidden = session.path("hidden.png");
+    // Dark, flood, 8 of the ramp, and 20 of the Gray code come before the patterns.
+    fs::rename(session.photo(14), &hidden).unwrap();
+    let error = session.refusal();
+    assert!(
+        error.contains("there are 82 photographs of 83 pictures"),
+        "{error}"
+    );
+    assert!(
+        error.contains("one is missing, of display/0014-graycode-"),
+        "{error}"
+    );
+    fs::rename(&hidden, session.photo(14)).unwrap();
+    fs::copy(session.photo(14), session.path("photos/IMG_0015b.png")).unwrap();
+    let error = session.refusal();
+    assert!(error.contains("one is too many"), "{error}");
+    fs::remove_file(session.path("photos/IMG_0015b.png")).unwrap();
+    fs::rename(session.photo(0), &hidden).unwrap();
+    fs::rename(session.photo(1), session.photo(0)).unwrap();
+    fs::rename(&hidden, session.photo(1)).unwrap();
+    let error = session.refusal();
+    assert!(
+        error.contains("IMG_0001.png is not dark, as display/0000-dark.png is"),
+        "{error}"
+    );
+    let forced = session.assemble(&["--force"]);
+    assert!(forced.status.success(), "{}", stderr_text(&forced));
+    assert!(
+        stderr_text(&forced).contains("warning: "),
+        "{}",
+        stderr_text(&forced)
+    );
+}
+
+#[test]
+fn wrong_input_is_named_with_its_remedy() {
+    let session = Session::new();
+    let (sequence, photos) = (session.text("sequence"), session.text("photos"));
+    let error = |arguments: &[&str]| {
+        let output = run(arguments);
+        assert!(!output.status.success(), "{arguments:?}");
+        stderr_text(&output)
+    };
+    for (arguments, part) in [
+        (
+            &["assemble", &photos, "--photos", &photos][..],
+            "is this a folder that `ltm-export patterns` wrote?",
+        ),
+        (
+            &["assemble", &sequence, "--photos", &sequence],
+            "no PNG or TIFF files",
+        ),
+        (
+            &["assemble", &sequence, "--photos", "none.png"],
+            "none.png: ",
+        ),
+        (
+            &[
+                "assemble", &sequence, "--photos", &photos, "--crop", "0,0,99x9",
+            ],
+            "less than --crop says",
+        ),
+        (
+            &[
+                "assemble", &sequence, "--photos", &photos, "--black", "9", "--white", "9",
+            ],
+            "--white must be above --black",
+        ),
+        (
+            &[
+                "patterns", "-o", "x", "--screen", "100x100", "--light", "200x10",
+            ],
+            "do not fit on a display of 100x100",
+        ),
+    ] {
+        let error = error(arguments);
+        assert!(error.contains(part), "no {part}: {error}");
+    }
+    let photo = session.photo(3);
+    image::open(&photo)
+        .unwrap()
+        .into_rgb8()
+        .save(&photo)
+        .unwrap();
+    let message = session.refusal();
+    assert!(
+        message.contains("IMG_0004.png: has 8 bits a sample"),
+        "{message}"
+    );
+    assert!(message.contains("--response srgb"), "{message}");
+    fs::write(&photo, "text").unwrap();
+    assert!(
+        session
+            .refusal()
+            .contains("IMG_0004.png: cannot be decoded")
+    );
+    let raw = session.path("IMG_0001.CR2");
+    fs::write(&raw, "raw").unwrap();
+    let message = error(&["assemble", &sequence, "--photos", raw.to_str().unwrap()]);
+    assert!(
+        message.contains("IMG_0001.CR2: is no PNG or TIFF"),
+        "{message}"
+    );
+}
+
+#[test]
+fn photographs_of_other_types_are_read() {
+    let session = Session::new();
+    // 8 bits with the curve of sRGB, of which some are grey, and some have an alpha channel, as TIFF.
+    for i in 0..83 {
+        let photo = session.photo(i);
+        let linear = image::open(&photo).unwrap().into_rgb16();
+        let encoded = image::RgbImage::from_fn(48, 48, |x, y| {
+            image::Rgb(linear.get_pixel(x, y).0.map(|code| {
+                let y = ((f64::from(code) - 512.0) / 59_488.0).clamp(0.0, 1.0);
+                let curve = match y {
+                    y if y <= 0.003_130_8 => 12.92 * y,
+                    y => 1.055 * y.powf(1.0 / 2.4) - 0.055,
+                };
+                (255.0 * curve).round() as u8
+            }))
+        });
+        fs::remove_file(&photo).unwrap();
+        let image = image::DynamicImage::ImageRgb8(encoded);
+        match i % 2 {
+            0 => image.save(&photo).unwrap(),
+            _ => image
+                .into_rgba8()
+                .save(photo.with_extension("tif"))
+                .unwrap(),
+        }
+    }
+    let [sequence, photos] = ["sequence", "photos"].map(|name| session.text(name));
+    succeed(&[
+        "assemble",
+        &sequence,
+        "--photos",
+        &photos,
+        "--response",
+        "srgb",
+        "--bin",
+        "2",
+    ]);
+    let manifest = session.manifest();
+    assert_eq!(manifest["camera"]["width"], 24);
+    assert_eq!(manifest["camera"].get("response"), None);
+    let response = &manifest["light"]["response"];
+    let middle = response
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|pair| pair[0] == 128.0)
+        .unwrap();
+    assert!(
+        (middle[1].as_f64().unwrap() - 0.2195).abs() < 0.01,
+        "{middle}"
+    );
+}
+
+#[test]
+fn the_player_has_the_sequence_and_the_pictures_have_whole_elements() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("session");
+    let output = succeed(&[
+        "patterns",
+        "-o",
+        path.to_str().unwrap(),
+        "--screen",
+        "100x60",
+        "--light",
+        "12x8",
+        "--patterns",
+        "3",
+        "--screen-width",
+        "250",
+        "--spread",
+        "30",
+        "--camera",
+        "600x400",
+    ]);
+    let plan = String::from_utf8(output.stdout).unwrap();
+    for part in [
+        "7 x 7 display pixels",
+        "17.50 mm wide",
+        "window of 7 x 7",
+        "averaging",
+    ] {
+        assert!(plan.contains(part), "no {part}: {plan}");
+    }
+    let sequence: Value =
+        serde_json::from_slice(&fs::read(path.join("sequence.json")).unwrap()).unwrap();
+    let pictures = sequence["pictures"].as_array().unwrap();
+    let player = fs::read_to_string(path.join("player.html")).unwrap();
+    for picture in pictures {
+        let name = picture["picture"].as_str().unwrap();
+        assert!(player.contains(name), "{name}");
+        let shown = image::open(path.join(name)).unwrap().into_luma8();
+        assert_eq!(shown.dimensions(), (100, 60));
+        if let Some(pattern) = picture["pattern"].as_str() {
+            let pattern = image::open(path.join(pattern)).unwrap().into_luma8();
+            assert_eq!(pattern.dimensions(), (12, 8));
+            for (u, v, code) in pattern.enumerate_pixels() {
+                let square = (0..49).map(|i| shown.get_pixel(8 + 7 * u + i % 7, 2 + 7 * v + i / 7));
+                assert!(
+                    square.into_iter().all(|shown| shown == code),
+                    "{name}: {u} {v}"
+                );
+            }
+        }
+    }
+    assert!(!player.contains("/* player."));
+}

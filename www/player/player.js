@@ -1,0 +1,312 @@
+/**
+ * The pattern player: shows the pictures of a sequence one after the other, pixel by pixel, and nothing else.
+ * `ltm-export patterns` writes it into the folder of a sequence, with the sequence in the page, so that it needs no server
+ * and no network.
+ */
+
+/** @typedef {{ layout: { display: { width: number, height: number } }, pictures: { picture: string, role: string }[] }} Sequence */
+
+const NEXT_KEYS = new Set([' ', 'ArrowRight', 'ArrowDown', 'PageDown', 'Enter']);
+const BACK_KEYS = new Set(['ArrowLeft', 'ArrowUp', 'PageUp', 'Backspace']);
+
+/**
+ * @template {HTMLElement} T
+ * @param {string} id
+ * @param {new () => T} type
+ * @returns {T}
+ */
+function element(id, type) {
+  const found = document.getElementById(id);
+  if (!(found instanceof type)) throw new Error(`the page has no ${id}`);
+  return found;
+}
+
+/** @type {Sequence} */
+const sequence = JSON.parse(element('sequence', HTMLScriptElement).textContent ?? '');
+const { display } = sequence.layout;
+const last = sequence.pictures.length - 1;
+
+/** Where the number of the picture is kept: another folder is another sequence. */
+const POSITION_KEY = `pattern-player ${location.pathname}`;
+
+/** A window or this page, filled by one picture. */
+class Stage {
+  /** @param {Window} view */
+  constructor(view) {
+    this.view = view;
+    this.wanted = '';
+    const { document } = view;
+    this.root = document.createElement('div');
+    this.root.style.cssText =
+      'position:fixed;inset:0;background:#000;overflow:hidden;cursor:none;z-index:1';
+    this.image = document.createElement('img');
+    this.image.alt = '';
+    this.image.style.cssText = 'position:absolute;left:0;top:0;image-rendering:pixelated';
+    this.root.append(this.image);
+    document.body.append(this.root);
+  }
+
+  /** Why the pictures cannot be shown pixel by pixel; undefined if they can. */
+  get problem() {
+    const { innerWidth, innerHeight, devicePixelRatio } = this.view;
+    const [width, height] = [innerWidth, innerHeight].map((side) =>
+      Math.round(side * devicePixelRatio),
+    );
+    if (width === display.width && height === display.height) return undefined;
+    return (
+      `The pictures have ${display.width} × ${display.height} pixels, but the window has ${width} × ${height}. ` +
+      'Set the display to its own resolution, its scale and the browser’s zoom to 100 %, and show the window in full ' +
+      `screen; or write pictures of this size with ltm-export patterns --screen ${width}x${height}.`
+    );
+  }
+
+  /**
+   * Shows a picture once it is decoded, unless another one is wanted by then.
+   *
+   * @param {string} url
+   */
+  async show(url) {
+    this.wanted = url;
+    const scale = 1 / this.view.devicePixelRatio;
+    this.image.style.width = `${display.width * scale}px`;
+    this.image.style.height = `${display.height * scale}px`;
+    const next = new Image();
+    next.src = url;
+    await next.decode();
+    if (this.wanted !== url) return;
+    this.image.src = url;
+    await this.image.decode();
+  }
+
+  close() {
+    this.root.remove();
+    if (this.view !== window) this.view.close();
+  }
+}
+
+class Player {
+  /** @type {Stage | undefined} */
+  stage;
+  position = 0;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  timer;
+  /** @type {WakeLockSentinel | undefined} */
+  wakeLock;
+  /** Pictures that the browser keeps. @type {HTMLImageElement[]} */
+  preloaded = [];
+
+  constructor() {
+    this.position = Math.min(Math.max(Number(readPosition()) || 0, 0), last);
+    element('count', HTMLElement).textContent = String(last + 1);
+    element('total', HTMLElement).textContent = String(last + 1);
+    element('size', HTMLElement).textContent = `${display.width} × ${display.height}`;
+    element('here', HTMLElement).onclick = () => this.openHere();
+    element('there', HTMLElement).onclick = () => this.openThere();
+    element('next', HTMLElement).onclick = () => this.move(1);
+    element('back', HTMLElement).onclick = () => this.move(-1);
+    element('restart', HTMLElement).onclick = () => this.move(-this.position);
+    const pace = element('pace', HTMLSelectElement);
+    pace.onchange = () => {
+      element('interval-label', HTMLElement).hidden = pace.value !== 'time';
+      this.schedule();
+    };
+    document.addEventListener('fullscreenchange', () => {
+      if (!document.fullscreenElement && this.stage?.view === window) this.closeStage();
+    });
+    this.update();
+  }
+
+  async openHere() {
+    const root = document.documentElement;
+    try {
+      await root.requestFullscreen({ navigationUI: 'hide' });
+    } catch {
+      report('The browser allows no full screen. Press F11, or use another browser.');
+      return;
+    }
+    await afterResize(window);
+    this.use(new Stage(window));
+  }
+
+  /** Opens a window, on the screen whose size the pictures have if the browser tells. */
+  async openThere() {
+    const place = await otherScreen();
+    const view = window.open('about:blank', 'pattern-player', `popup,${place.features}`);
+    if (!view) {
+      report('The browser blocked the window. Allow windows of this page, and try again.');
+      return;
+    }
+    view.document.title = 'Patterns';
+    view.document.documentElement.lang = 'en';
+    const stage = new Stage(view);
+    view.addEventListener('pagehide', () => {
+      if (this.stage === stage) this.closeStage();
+    });
+    view.addEventListener('resize', () => this.check());
+    const button = view.document.createElement('button');
+    button.textContent = 'Move this window to the screen of the patterns, then click here';
+    button.style.cssText = 'position:fixed;inset:0;margin:auto;font:1.5rem system-ui;z-index:2';
+    button.onclick = async () => {
+      await view.document.documentElement.requestFullscreen({ navigationUI: 'hide' });
+      await afterResize(view);
+      button.remove();
+      this.use(stage);
+    };
+    view.document.body.append(button);
+    button.focus();
+  }
+
+  /** @param {Stage} stage */
+  use(stage) {
+    this.stage?.close();
+    this.stage = stage;
+    if (!this.check()) return;
+    stage.view.addEventListener('keydown', this.onKey);
+    stage.root.addEventListener('click', () => this.move(1));
+    this.keepAwake();
+    this.update();
+  }
+
+  /** Whether the stage shows pictures pixel by pixel; if not, it is closed with the reason. */
+  check() {
+    const problem = this.stage?.problem;
+    if (problem) {
+      this.closeStage();
+      report(problem);
+    } else if (this.stage) {
+      report('');
+    }
+    return !problem;
+  }
+
+  closeStage() {
+    clearTimeout(this.timer);
+    const { stage } = this;
+    this.stage = undefined;
+    stage?.view.removeEventListener('keydown', this.onKey);
+    stage?.close();
+    if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
+    this.wakeLock?.release().catch(() => {});
+    this.wakeLock = undefined;
+  }
+
+  /** @param {KeyboardEvent} event */
+  onKey = (event) => {
+    // A key that is held down is one step.
+    if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
+    const step = NEXT_KEYS.has(event.key) ? 1 : BACK_KEYS.has(event.key) ? -1 : 0;
+    if (step === 0) return;
+    event.preventDefault();
+    this.move(step);
+  };
+
+  /** @param {number} step */
+  move(step) {
+    const to = this.position + step;
+    if (to < 0) return;
+    if (to > last) {
+      this.closeStage();
+      report('That was the last picture.');
+      return;
+    }
+    this.position = to;
+    savePosition(to);
+    this.update();
+  }
+
+  update() {
+    const { picture, role } = /** @type {Sequence['pictures'][number]} */ (
+      sequence.pictures[this.position]
+    );
+    element('number', HTMLElement).textContent = String(this.position + 1);
+    element('name', HTMLElement).textContent = `${picture} (${role})`;
+    element('thumbnail', HTMLImageElement).src = picture;
+    this.preloaded = sequence.pictures.slice(this.position + 1, this.position + 4).map((next) => {
+      const image = new Image();
+      image.src = next.picture;
+      return image;
+    });
+    this.show(picture);
+  }
+
+  /** @param {string} picture */
+  async show(picture) {
+    clearTimeout(this.timer);
+    const { stage } = this;
+    if (!stage) return;
+    try {
+      await stage.show(new URL(picture, location.href).href);
+    } catch {
+      this.closeStage();
+      report(`${picture} cannot be read. Keep this page in the folder of its pictures.`);
+      return;
+    }
+    this.schedule();
+  }
+
+  schedule() {
+    clearTimeout(this.timer);
+    if (!this.stage || element('pace', HTMLSelectElement).value !== 'time') return;
+    const seconds = Math.max(element('interval', HTMLInputElement).valueAsNumber || 3, 0.2);
+    this.timer = setTimeout(() => this.move(1), 1000 * seconds);
+  }
+
+  async keepAwake() {
+    try {
+      this.wakeLock = await navigator.wakeLock.request('screen');
+    } catch {
+      // Not in every browser, and not from files: the page asks to switch off the screen saver.
+    }
+  }
+}
+
+/** @param {string} text */
+function report(text) {
+  element('problem', HTMLElement).textContent = text;
+}
+
+function readPosition() {
+  try {
+    return localStorage.getItem(POSITION_KEY);
+  } catch {
+    return null;
+  }
+}
+
+/** @param {number} position */
+function savePosition(position) {
+  try {
+    localStorage.setItem(POSITION_KEY, String(position));
+  } catch {
+    // Without storage, a reload starts again.
+  }
+}
+
+/** Full screen takes a moment to change the size. @param {Window} view */
+function afterResize(view) {
+  return new Promise((resolve) => {
+    setTimeout(() => view.requestAnimationFrame(() => resolve(undefined)), 300);
+  });
+}
+
+/** Where a window for the patterns opens. */
+async function otherScreen() {
+  const features = `width=${Math.round(screen.width / 2)},height=${Math.round(screen.height / 2)}`;
+  if (!('getScreenDetails' in window)) return { features };
+  try {
+    /** @type {{ screens: (Screen & { left: number, top: number, devicePixelRatio: number })[], currentScreen: Screen }} */
+    const details = await /** @type {any} */ (window).getScreenDetails();
+    const others = details.screens.filter((other) => other !== details.currentScreen);
+    const fits = (/** @type {(typeof others)[number]} */ other) =>
+      Math.round(other.width * other.devicePixelRatio) === display.width &&
+      Math.round(other.height * other.devicePixelRatio) === display.height;
+    const chosen = others.find(fits) ?? others[0];
+    if (!chosen) return { features };
+    const { left, top, width, height } = chosen;
+    return { features: `left=${left},top=${top},width=${width},height=${height}` };
+  } catch {
+    return { features };
+  }
+}
+
+new Player();
