@@ -223,13 +223,13 @@ fn wrong_input_is_named_with_its_remedy() {
         ),
         (
             &["assemble", &sequence, "--photos", "none.png"],
-            "none.png: ",
+            "none.png: there is no such file or folder",
         ),
         (
             &[
                 "assemble", &sequence, "--photos", &photos, "--crop", "0,0,99x9",
             ],
-            "less than --crop says",
+            "has 48x48 pixels, but --crop keeps 99x9",
         ),
         (
             &[
@@ -241,7 +241,7 @@ fn wrong_input_is_named_with_its_remedy() {
             &[
                 "patterns", "-o", "x", "--screen", "100x100", "--light", "200x10",
             ],
-            "do not fit on a display of 100x100",
+            "use at most 100x100",
         ),
     ] {
         let error = error(arguments);
@@ -265,11 +265,33 @@ fn wrong_input_is_named_with_its_remedy() {
             .refusal()
             .contains("IMG_0004.png: cannot be decoded")
     );
-    let raw = session.path("IMG_0001.CR2");
-    fs::write(&raw, "raw").unwrap();
-    let message = error(&["assemble", &sequence, "--photos", raw.to_str().unwrap()]);
+    let raw = photo.with_extension("CR2");
+    fs::rename(&photo, &raw).unwrap();
+    let names = (0..83).map(|i| {
+        if i == 3 {
+            raw.clone()
+        } else {
+            session.photo(i)
+        }
+    });
+    let names: Vec<String> = names
+        .map(|path| path.to_str().unwrap().to_owned())
+        .collect();
+    let mut arguments = vec!["assemble", &sequence, "--photos"];
+    arguments.extend(names.iter().map(String::as_str));
+    let message = error(&arguments);
     assert!(
-        message.contains("IMG_0001.CR2: is no PNG or TIFF"),
+        message.contains("IMG_0004.CR2: is no PNG or TIFF"),
+        "{message}"
+    );
+    // One file of a folder cannot be told from a sidecar.
+    assert!(session.refusal().contains("one is missing"));
+    fs::create_dir(session.path("sequence/photos")).unwrap();
+    fs::write(session.path("sequence/photos/mine.tif"), "").unwrap();
+    let output = session.assemble(&[]);
+    let message = stderr_text(&output);
+    assert!(
+        message.contains("photos: is there already, but assemble writes"),
         "{message}"
     );
 }
@@ -302,6 +324,24 @@ fn photographs_of_other_types_are_read() {
         }
     }
     let [sequence, photos] = ["sequence", "photos"].map(|name| session.text(name));
+    // One with 16 bits is not like the others.
+    let first = session.photo(0);
+    let encoded = image::open(&first).unwrap();
+    encoded.to_rgb16().save(&first).unwrap();
+    let mixed = run(&[
+        "assemble",
+        &sequence,
+        "--photos",
+        &photos,
+        "--response",
+        "srgb",
+    ]);
+    assert!(
+        stderr_text(&mixed).contains("but not both"),
+        "{}",
+        stderr_text(&mixed)
+    );
+    encoded.save(&first).unwrap();
     succeed(&[
         "assemble",
         &sequence,

@@ -18,15 +18,32 @@ pub struct DisplayLayout {
 
 /// Why a light plane has no place on a display.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-#[error(
-    "{light} light elements of {element_side} x {element_side} pixels do not fit on a display of {display} pixels; the largest \
-     that fit have {largest}"
-)]
-pub struct DisplayLayoutError {
-    display: Extent,
-    light: Extent,
-    element_side: u32,
-    largest: u32,
+pub enum DisplayLayoutError {
+    /// There are more elements than pixels.
+    #[error(
+        "a display of {display} pixels has no place for {light} light elements; use at most {display}"
+    )]
+    TooManyElements {
+        /// Size of the display in pixels.
+        display: Extent,
+        /// Size of the light plane in elements.
+        light: Extent,
+    },
+    /// Elements are too large.
+    #[error(
+        "{light} light elements of {element_side} x {element_side} pixels do not fit on a display of {display} pixels; use at \
+         most {largest} x {largest} pixels"
+    )]
+    TooLargeElements {
+        /// Size of the display in pixels.
+        display: Extent,
+        /// Size of the light plane in elements.
+        light: Extent,
+        /// Side of an element in pixels.
+        element_side: u32,
+        /// The largest side that fits.
+        largest: u32,
+    },
 }
 
 impl DisplayLayout {
@@ -40,14 +57,17 @@ impl DisplayLayout {
         element_side: Option<u32>,
     ) -> Result<Self, DisplayLayoutError> {
         let largest = (display.width / light.width).min(display.height / light.height);
-        let element_side = element_side.unwrap_or(largest.max(1));
+        if largest == 0 {
+            return Err(DisplayLayoutError::TooManyElements { display, light });
+        }
+        let element_side = element_side.unwrap_or(largest);
         match (1..=largest).contains(&element_side) {
             true => Ok(Self {
                 display,
                 light,
                 element_side,
             }),
-            false => Err(DisplayLayoutError {
+            false => Err(DisplayLayoutError::TooLargeElements {
                 display,
                 light,
                 element_side,
@@ -115,13 +135,13 @@ mod tests {
 
     #[test]
     fn elements_that_do_not_fit_are_refused_with_the_largest_that_do() {
-        for (light, element, largest) in [((12, 2), None, "0"), ((3, 2), Some(4), "3")] {
+        for (light, element, part) in [
+            ((12, 2), None, "use at most 11x7"),
+            ((3, 2), Some(4), "use at most 3 x 3 pixels"),
+        ] {
             let light = Extent::new(light.0, light.1);
             let error = DisplayLayout::new(Extent::new(11, 7), light, element).unwrap_err();
-            assert!(
-                error.to_string().ends_with(&format!("have {largest}")),
-                "{error}"
-            );
+            assert!(error.to_string().ends_with(part), "{error}");
         }
     }
 }

@@ -1,15 +1,17 @@
 //! The pictures that a display shows in a session, in order.
 
+use std::collections::HashSet;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::display_layout::DisplayLayout;
+use super::display_layout::{DisplayLayout, DisplayLayoutError};
 use crate::calibrate::LightPlaneAxis;
 use crate::capture::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
 use crate::simulate::{
     GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, RandomStreamId,
 };
-use crate::transport::Extent;
+use crate::transport::{Extent, MAX_SIDE};
 
 /// File name of a sequence.
 pub const SEQUENCE_NAME: &str = "sequence.json";
@@ -97,6 +99,22 @@ pub enum SequenceError {
     /// There are no patterns.
     #[error("\"pictures\" has no random patterns")]
     NoPatterns,
+    /// The light plane has no place on the display.
+    #[error("\"layout\": {0}")]
+    Layout(#[from] DisplayLayoutError),
+    /// A side of the display or the light plane is zero or too large.
+    #[error("\"layout\" has a side that is not between 1 and {MAX_SIDE}")]
+    Side,
+    /// A path leads out of the folder that it must be in, or is there twice.
+    #[error("pictures[{index}]: {path:?} must be the only PNG of this name in {folder}/")]
+    Path {
+        /// Index of the picture.
+        index: usize,
+        /// The path.
+        path: String,
+        /// Its folder.
+        folder: &'static str,
+    },
 }
 
 impl PatternSequence {
@@ -193,10 +211,52 @@ impl PatternSequence {
         let sequence: Self = serde_json::from_str(json)?;
         let is_pattern =
             |picture: &SequencePicture| matches!(picture.role, PictureRole::Pattern { .. });
-        match sequence.pictures.iter().any(is_pattern) {
-            true => Ok(sequence),
-            false => Err(SequenceError::NoPatterns),
+        if !sequence.pictures.iter().any(is_pattern) {
+            return Err(SequenceError::NoPatterns);
         }
+        sequence.check_layout()?;
+        sequence.check_paths()?;
+        Ok(sequence)
+    }
+
+    fn check_layout(&self) -> Result<(), SequenceError> {
+        let DisplayLayout {
+            display,
+            light,
+            element_side,
+        } = self.layout;
+        let sides = [display.width, display.height, light.width, light.height];
+        if !sides.iter().all(|side| (1..=MAX_SIDE).contains(side)) {
+            return Err(SequenceError::Side);
+        }
+        DisplayLayout::new(display, light, Some(element_side))?;
+        Ok(())
+    }
+
+    /// Every file is in the folder of its kind, and is there once.
+    fn check_paths(&self) -> Result<(), SequenceError> {
+        let mut seen = HashSet::new();
+        for (index, picture) in self.pictures.iter().enumerate() {
+            let photos = match picture.role {
+                PictureRole::GrayCode { .. } => "graycode",
+                _ => "photos",
+            };
+            let mut paths = vec![("display", &picture.picture), (photos, &picture.photo)];
+            if let PictureRole::Pattern { pattern } = &picture.role {
+                paths.push(("patterns", pattern));
+            }
+            for (folder, path) in paths {
+                if !is_png_in(folder, path) || !seen.insert(path) {
+                    let path = path.clone();
+                    return Err(SequenceError::Path {
+                        index,
+                        path,
+                        folder,
+                    });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The manifest of the capture folder that the photographs make; `response` is that of the display, if the ramp shows
@@ -244,6 +304,15 @@ impl PatternSequence {
         }
         manifest
     }
+}
+
+/// Whether `path` is that of a PNG right in `folder`.
+fn is_png_in(folder: &str, path: &str) -> bool {
+    let name = path
+        .strip_prefix(folder)
+        .and_then(|rest| rest.strip_prefix('/'));
+    name.and_then(|name| name.strip_suffix(".png"))
+        .is_some_and(|stem| !stem.is_empty() && !stem.contains(['/', '\\']))
 }
 
 /// The codes of a pattern that is the same for all primaries.

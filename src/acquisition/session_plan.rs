@@ -6,6 +6,10 @@ use crate::transport::Extent;
 
 /// Camera pixels an element of the light plane should have along each axis: fewer lose detail, more cost time and space.
 const CAMERA_PIXELS: [f64; 2] = [1.5, 4.0];
+/// The window that `recover` takes by default.
+const DEFAULT_WINDOW: u32 = 15;
+/// Least side of a light plane.
+const MIN_LIGHT_SIDE: u32 = 4;
 /// Channels times bytes of a sample of a photograph.
 const BYTES_PER_PIXEL: u64 = 6;
 
@@ -112,20 +116,29 @@ impl SessionPlan {
 
     fn window_line(&self, window: u32) -> String {
         let largest = WindowSizeEstimate::MAX_WINDOW.side();
+        let spread = self.setup.spread_mm.unwrap_or_default();
         let needed = format!(
-            "light that spreads by {} mm needs a window of {window} x {window} elements",
-            self.setup.spread_mm.unwrap_or_default()
+            "light that spreads by {spread} mm needs a window of {window} x {window} elements"
         );
-        match window <= largest {
-            true => format!("{needed}: `recover --window {window}`, or the default, `auto`"),
+        if window <= DEFAULT_WINDOW {
+            return format!("{needed}; the default of `recover`, {DEFAULT_WINDOW}, holds it");
+        }
+        if window <= largest {
+            return format!("{needed}: `recover --window {window}`");
+        }
+        let side = self.element_mm().unwrap_or_default() / f64::from(self.layout.element_side);
+        // Elements of so many display pixels have the largest window.
+        let least = (spread / (f64::from((largest - 3) / 2) * side)).ceil();
+        let DisplayLayout { display, .. } = self.layout;
+        let [width, height] =
+            [display.width, display.height].map(|n| (f64::from(n) / least) as u32);
+        match width.min(height) >= MIN_LIGHT_SIDE {
+            true => format!(
+                "{needed}, too many to recover well: choose at most --light {width}x{height}, or bring the object closer to the \
+                 display"
+            ),
             false => {
-                let factor = f64::from(window) / f64::from(largest);
-                let [width, height] = [self.layout.light.width, self.layout.light.height]
-                    .map(|n| (f64::from(n) / factor).floor().max(1.0));
-                format!(
-                    "{needed}, more than the {largest} x {largest} of the default: with --light {width}x{height} elements are \
-                     large enough"
-                )
+                format!("{needed}, too many to recover: the object is too far from this display")
             }
         }
     }
@@ -156,7 +169,7 @@ mod tests {
         for part in [
             "20 x 20 display pixels",
             "4.69 mm wide",
-            "`recover --window 13`",
+            "of `recover`, 15, holds it",
             "10 minutes",
         ] {
             assert!(lines.contains(part), "no {part}: {lines}");
@@ -168,7 +181,12 @@ mod tests {
         let fine = plan(Extent::new(512, 288), 20.0, Extent::new(400, 225))
             .lines()
             .join("\n");
-        assert!(fine.contains("elements are large enough"), "{fine}");
+        // 7 display pixels are 1.6 mm, over 13 of which light spreads.
+        assert!(fine.contains("--light 365x205"), "{fine}");
+        let advised = plan(Extent::new(365, 205), 20.0, Extent::new(400, 225));
+        assert!(advised.window() <= Some(31), "{:?}", advised.window());
+        let far = plan(Extent::new(64, 36), 5000.0, Extent::new(400, 225));
+        assert!(far.lines().join(" ").contains("too far from this display"));
         assert!(fine.contains("fewer elements"), "{fine}");
         let large = plan(Extent::new(32, 18), 1.0, Extent::new(3200, 1800))
             .lines()

@@ -64,7 +64,14 @@ impl Measurements {
             };
             row.values[x] && neighbours.iter().all(|&x| is_lit(row.start + x))
         };
-        self.fill_pixels(Self::has_one_code, is_dead)
+        // The first photograph of the same exposure, at which one code is one measurement.
+        let full_scales = self.full_scale.iter();
+        let first = full_scales.map(|own| self.full_scale.iter().position(|other| other == own));
+        let first: Vec<usize> = first.flatten().collect();
+        self.fill_pixels(
+            |measurements, n| measurements.has_one_code(n, &first),
+            is_dead,
+        )
     }
 
     /// Fills the pixels of which `is_defective` holds, given their row with a value of each pixel, their column and those
@@ -110,19 +117,13 @@ impl Measurements {
         count as f64 / self.photos.len() as f64
     }
 
-    /// Whether pixel `n` has one code in all photographs: one measurement at each exposure.
-    fn has_one_code(&self, n: usize) -> bool {
-        let mut pairs = 0;
-        let full_scales = self.full_scale.windows(2);
-        for (photos, full_scales) in self.photos.windows(2).zip(full_scales) {
-            if full_scales[0] == full_scales[1] {
-                if photos[0][n] != photos[1][n] {
-                    return false;
-                }
-                pairs += 1;
-            }
-        }
-        pairs + 1 >= MIN_DEAD_PHOTOGRAPHS
+    /// Whether pixel `n` has one code in all photographs: the measurement of the `first` photograph of each one's exposure.
+    fn has_one_code(&self, n: usize, first: &[usize]) -> bool {
+        let repeated = first.iter().enumerate().filter(|(l, first)| *l != **first);
+        repeated.clone().count() + 1 >= MIN_DEAD_PHOTOGRAPHS
+            && repeated
+                .into_iter()
+                .all(|(l, &first)| self.photos[l][n] == self.photos[first][n])
     }
 
     /// Mean of the samples of pixel `n` that are not saturated, in channel `c`.
@@ -180,13 +181,15 @@ mod tests {
         const QUANTUM: f64 = 1e-5;
         let mut measurements = SyntheticCapture::smooth(12).measurements;
         measurements.noise.floor = [QUANTUM * QUANTUM; 3];
-        // The last two photographs have another exposure, of which one code is another measurement.
-        measurements.full_scale[10..].fill(2.0);
+        // Two photographs have another exposure, of which one code is another measurement.
+        for l in [3, 7] {
+            measurements.full_scale[l] = 2.0;
+        }
         let clean = measurements.photos.clone();
         assert_eq!(measurements.fill_dead_pixels(QUANTUM), 0);
         let (dead, dark) = (5 * 32 + 7, 9 * 32 + 7);
         for (l, photo) in measurements.photos.iter_mut().enumerate() {
-            photo[dead] = [if l < 10 { -0.001 } else { -0.0005 }; 3];
+            photo[dead] = [if [3, 7].contains(&l) { -0.0005 } else { -0.001 }; 3];
             // Without light, samples vary.
             photo[dark] = [1e-5 * (l % 2) as f32; 3];
         }

@@ -117,7 +117,7 @@ impl CameraResponse {
             Self::Srgb => power((code + 0.055) / 1.055, 2.4),
             Self::Gamma(_) if code <= 0.0 => 0.0,
             Self::Gamma(gamma) => power(code, gamma),
-            Self::Compression(slope) => code / (slope - (slope - 1.0) * code),
+            Self::Compression(slope) => code / (slope - (slope - 1.0) * code.max(0.0)),
         }
     }
 

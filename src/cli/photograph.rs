@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use image::ExtendedColorType;
 use rayon::prelude::*;
 
 use super::capture_writer::{MAX_ELECTRONS, gray_code_shot, write_png};
 use super::{output_folder, progress};
-use crate::acquisition::{PatternSequence, SEQUENCE_NAME};
+use crate::acquisition::{PatternSequence, PictureRole, SEQUENCE_NAME};
 use crate::capture::{
     CaptureFolder, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, ManifestCamera, Pattern, Shot,
 };
@@ -111,11 +111,29 @@ fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
         };
         read().with_context(|| path.display().to_string())
     });
-    let mut emissions = emissions.collect::<Result<Vec<_>>>()?;
+    let emissions = emissions.collect::<Result<Vec<Vec<f32>>>>()?;
+    let declared = |fault: &&SessionFault| fault.is_declared();
+    if let Some(fault) = args.faults.iter().find(declared) {
+        bail!(
+            "--fault {fault} is in capture.json, which a sequence does not have yet; photograph a capture with it"
+        );
+    }
+    // What displays do to patterns in particular.
+    let is_pattern = |i: &usize| matches!(sequence.pictures[*i].role, PictureRole::Pattern { .. });
+    let (patterns, others): (Vec<usize>, Vec<usize>) = (0..emissions.len()).partition(is_pattern);
+    let select = |indices: &[usize]| -> Vec<Vec<f32>> {
+        indices.iter().map(|&i| emissions[i].clone()).collect()
+    };
+    let (mut lights, mut other_lights) = (select(&patterns), select(&others));
     let mut random = RandomStreamId::Fault.start(args.seed);
     for fault in &args.faults {
-        fault.change_emissions(layout.light, &mut emissions, &mut [], &mut random);
+        fault.change_emissions(layout.light, &mut lights, &mut other_lights, &mut random);
     }
+    let order = patterns.into_iter().chain(others);
+    let mut shown: Vec<(usize, Vec<f32>)> =
+        order.zip(lights.into_iter().chain(other_lights)).collect();
+    shown.sort_by_key(|(i, _)| *i);
+    let emissions: Vec<Vec<f32>> = shown.into_iter().map(|(_, light)| light).collect();
     let channels: Vec<_> = (0..CHANNELS)
         .map(|c| channel_pictures(&truth, c, &emissions))
         .collect();

@@ -30,7 +30,7 @@ pub async fn find_response(
     measurements: &Measurements,
     window: Window,
     executor: &impl Executor,
-) -> Result<Option<ResponseHypothesis>, RecoverError> {
+) -> Result<Vec<ResponseHypothesis>, RecoverError> {
     let geometry = preparation_input::geometry(measurements, window)?;
     let split = HoldoutSplit::new(&measurements.patterns);
     let preparation = RecoveryPreparationInput {
@@ -219,9 +219,9 @@ impl PreparedRecovery {
         photometry::find_flicker(input, executor)
     }
 
-    /// A response of display or camera with which the photographs predict one another better than with the declared one.
-    /// `None` if there is none, or too little is measured to tell. `measurements` are those that the recovery was prepared
-    /// from.
+    /// Responses of display or camera with which the photographs predict one another better than with the declared one, the
+    /// best first. Empty if there is none, or too little is measured to tell. `measurements` are those that the recovery was
+    /// prepared from.
     ///
     /// # Errors
     /// Those of [`find_response`].
@@ -229,7 +229,7 @@ impl PreparedRecovery {
         &self,
         measurements: &Measurements,
         executor: &impl Executor,
-    ) -> Result<Option<ResponseHypothesis>, RecoverError> {
+    ) -> Result<Vec<ResponseHypothesis>, RecoverError> {
         let mean_function = &self.photometry.mean_function;
         // Photometry found the photographs too different from what their patterns predict.
         if mean_function.is_empty() {

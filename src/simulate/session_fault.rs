@@ -290,6 +290,11 @@ impl SessionFault {
         self.kind == Kind::Mirror
     }
 
+    /// Whether the fault is in what is declared, not in the photographs.
+    pub fn is_declared(self) -> bool {
+        matches!(self.kind, Kind::Mirror | Kind::Gamma)
+    }
+
     /// Changes what is declared.
     pub fn change_manifest(self, manifest: &mut Manifest) {
         match self.kind {

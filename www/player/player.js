@@ -22,12 +22,12 @@ function element(id, type) {
 }
 
 /** @type {Sequence} */
-const sequence = JSON.parse(element('sequence', HTMLScriptElement).textContent ?? '');
+const sequence = JSON.parse(sequenceText());
 const { display } = sequence.layout;
 const last = sequence.pictures.length - 1;
 
-/** Where the number of the picture is kept: another folder is another sequence. */
-const POSITION_KEY = `pattern-player ${location.pathname}`;
+/** Where the number of the picture is kept, for this sequence in this folder. */
+const POSITION_KEY = `pattern-player ${hash(sequenceText())} ${location.pathname}`;
 
 /** A window or this page, filled by one picture. */
 class Stage {
@@ -39,10 +39,6 @@ class Stage {
     this.root = document.createElement('div');
     this.root.style.cssText =
       'position:fixed;inset:0;background:#000;overflow:hidden;cursor:none;z-index:1';
-    this.image = document.createElement('img');
-    this.image.alt = '';
-    this.image.style.cssText = 'position:absolute;left:0;top:0;image-rendering:pixelated';
-    this.root.append(this.image);
     document.body.append(this.root);
   }
 
@@ -67,15 +63,15 @@ class Stage {
    */
   async show(url) {
     this.wanted = url;
-    const scale = 1 / this.view.devicePixelRatio;
-    this.image.style.width = `${display.width * scale}px`;
-    this.image.style.height = `${display.height * scale}px`;
-    const next = new Image();
-    next.src = url;
-    await next.decode();
-    if (this.wanted !== url) return;
-    this.image.src = url;
-    await this.image.decode();
+    const [width, height] = [display.width, display.height].map(
+      (side) => side / this.view.devicePixelRatio,
+    );
+    const image = this.view.document.createElement('img');
+    image.alt = '';
+    image.style.cssText = `position:absolute;left:0;top:0;width:${width}px;height:${height}px;image-rendering:pixelated`;
+    image.src = url;
+    await image.decode();
+    if (this.wanted === url) this.root.replaceChildren(image);
   }
 
   close() {
@@ -88,7 +84,9 @@ class Player {
   /** @type {Stage | undefined} */
   stage;
   position = 0;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  /** When the next picture follows by time, on the clock of `performance.now`. @type {number | undefined} */
+  due;
+  /** @type {number | undefined} */
   timer;
   /** @type {WakeLockSentinel | undefined} */
   wakeLock;
@@ -96,7 +94,7 @@ class Player {
   preloaded = [];
 
   constructor() {
-    this.position = Math.min(Math.max(Number(readPosition()) || 0, 0), last);
+    this.position = Math.min(Math.max(Number.parseInt(readPosition() ?? '', 10) || 0, 0), last);
     element('count', HTMLElement).textContent = String(last + 1);
     element('total', HTMLElement).textContent = String(last + 1);
     element('size', HTMLElement).textContent = `${display.width} × ${display.height}`;
@@ -108,8 +106,14 @@ class Player {
     const pace = element('pace', HTMLSelectElement);
     pace.onchange = () => {
       element('interval-label', HTMLElement).hidden = pace.value !== 'time';
+      this.due = undefined;
       this.schedule();
     };
+    document.addEventListener('keydown', (event) => {
+      const isControl =
+        event.target instanceof HTMLElement && event.target.closest('button, select, input');
+      if (this.stage && this.stage.view !== window && !isControl) this.onKey(event);
+    });
     document.addEventListener('fullscreenchange', () => {
       if (!document.fullscreenElement && this.stage?.view === window) this.closeStage();
     });
@@ -130,6 +134,7 @@ class Player {
 
   /** Opens a window, on the screen whose size the pictures have if the browser tells. */
   async openThere() {
+    this.closeStage();
     const place = await otherScreen();
     const view = window.open('about:blank', 'pattern-player', `popup,${place.features}`);
     if (!view) {
@@ -147,7 +152,11 @@ class Player {
     button.textContent = 'Move this window to the screen of the patterns, then click here';
     button.style.cssText = 'position:fixed;inset:0;margin:auto;font:1.5rem system-ui;z-index:2';
     button.onclick = async () => {
-      await view.document.documentElement.requestFullscreen({ navigationUI: 'hide' });
+      try {
+        await view.document.documentElement.requestFullscreen({ navigationUI: 'hide' });
+      } catch {
+        report('The browser allows no full screen. Press F11 in the window of the patterns.');
+      }
       await afterResize(view);
       button.remove();
       this.use(stage);
@@ -180,7 +189,8 @@ class Player {
   }
 
   closeStage() {
-    clearTimeout(this.timer);
+    this.clearTimer();
+    this.due = undefined;
     const { stage } = this;
     this.stage = undefined;
     stage?.view.removeEventListener('keydown', this.onKey);
@@ -200,12 +210,19 @@ class Player {
     this.move(step);
   };
 
-  /** @param {number} step */
+  /** By hand. @param {number} step */
   move(step) {
+    this.due = undefined;
+    this.go(step);
+  }
+
+  /** @param {number} step */
+  go(step) {
     const to = this.position + step;
     if (to < 0) return;
     if (to > last) {
       this.closeStage();
+      savePosition(0);
       report('That was the last picture.');
       return;
     }
@@ -231,24 +248,37 @@ class Player {
 
   /** @param {string} picture */
   async show(picture) {
-    clearTimeout(this.timer);
+    this.clearTimer();
     const { stage } = this;
     if (!stage) return;
+    const url = new URL(picture, location.href).href;
     try {
-      await stage.show(new URL(picture, location.href).href);
+      await stage.show(url);
     } catch {
+      if (stage !== this.stage || stage.wanted !== url) return;
       this.closeStage();
       report(`${picture} cannot be read. Keep this page in the folder of its pictures.`);
       return;
     }
-    this.schedule();
+    if (stage === this.stage && stage.wanted === url) this.schedule();
   }
 
+  /** By time, pictures follow at multiples of the interval, however long they take to load: a camera keeps its own time. */
   schedule() {
-    clearTimeout(this.timer);
+    this.clearTimer();
     if (!this.stage || element('pace', HTMLSelectElement).value !== 'time') return;
     const seconds = Math.max(element('interval', HTMLInputElement).valueAsNumber || 3, 0.2);
-    this.timer = setTimeout(() => this.move(1), 1000 * seconds);
+    const due = this.due ?? performance.now() + 1000 * seconds;
+    this.due = due;
+    // By the window that is shown: others have slower timers.
+    this.timer = this.stage.view.setTimeout(() => {
+      this.due = due + 1000 * seconds;
+      this.go(1);
+    }, due - performance.now());
+  }
+
+  clearTimer() {
+    this.stage?.view.clearTimeout(this.timer);
   }
 
   async keepAwake() {
@@ -258,6 +288,17 @@ class Player {
       // Not in every browser, and not from files: the page asks to switch off the screen saver.
     }
   }
+}
+
+function sequenceText() {
+  return element('sequence', HTMLScriptElement).textContent ?? '';
+}
+
+/** A number that differs between texts. @param {string} text */
+function hash(text) {
+  let value = 0;
+  for (const character of text) value = (31 * value + (character.codePointAt(0) ?? 0)) | 0;
+  return value;
 }
 
 /** @param {string} text */

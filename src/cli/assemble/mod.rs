@@ -3,7 +3,7 @@
 mod photograph_file;
 mod photograph_list;
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
@@ -14,16 +14,20 @@ use tempfile::TempDir;
 use self::photograph_file::{DevelopSettings, DevelopedPhotograph, develop};
 use super::advice::error_with_remedy;
 use super::capture_writer::write_png;
-use super::process_resources::InterruptibleCores;
+use super::process_resources::{Interrupted, InterruptibleCores};
 use super::progress;
 use super::value_parsers::UsageError;
 use crate::acquisition::{
-    PairingFault, PatternSequence, PictureRole, SEQUENCE_NAME, SequenceBrightness, SequencePicture,
+    PairingFault, PatternSequence, PictureRole, SEQUENCE_NAME, SequenceBrightness,
 };
-use crate::capture::{CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME};
+use crate::capture::{CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME, Manifest};
 use crate::job_executor::Executor;
 use crate::transport::{Extent, TileRect};
 
+/// Folders that photographs are written into.
+const FOLDERS: [&str; 2] = ["photos", "graycode"];
+/// Photographs that are in memory at once.
+const MAX_READERS: usize = 4;
 /// Rows of the Gray code that are decoded, at most.
 const GRAY_CODE_ROWS: u32 = 64;
 /// Most faults that are listed.
@@ -43,7 +47,7 @@ pub struct AssembleArgs {
     /// Folder that `ltm-export patterns` wrote
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Photographs in the order in which they were taken, or a folder of them, which is sorted by name: PNG or TIFF of 16
+    /// Photographs in the order in which they were taken, or a folder of them, which is sorted by the numbers in their names: PNG or TIFF of 16
     /// bits, linear
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     photos: Vec<PathBuf>,
@@ -105,8 +109,12 @@ pub fn run(args: &AssembleArgs) -> Result<()> {
         bail!(UsageError("--white must be above --black"));
     }
     let sequence = read_sequence(&args.folder)?;
-    ensure_new(&args.folder, &sequence)?;
+    ensure_new(&args.folder)?;
     let paths = photograph_list::photographs(&args.photos)?;
+    // One may be found; for more there is no need to read them.
+    if paths.len().abs_diff(sequence.pictures.len()) > 1 {
+        bail!(wrong_count(paths.len(), sequence.pictures.len(), ""));
+    }
     let settings = DevelopSettings {
         response: args.response,
         black: f64::from(args.black),
@@ -124,19 +132,22 @@ pub fn run(args: &AssembleArgs) -> Result<()> {
     let manifest = session
         .sequence
         .manifest(settings.camera(session.extent), response);
-    session.move_into_place(&args.folder)?;
-    let path = args.folder.join(MANIFEST_NAME);
-    let json = serde_json::to_string_pretty(&manifest)?;
-    std::fs::write(&path, json + "\n").with_context(|| path.display().to_string())?;
-    if let Err(error) = check_gray_code(&args.folder) {
-        eprintln!("warning: {}", error_with_remedy(&error));
-    }
-    eprintln!(
-        "{}: {} shots of {} pixels; `ltm-export recover` takes this folder",
+    session.move_into_place(&args.folder, &manifest)?;
+    let summary = format!(
+        "{}: {} shots of {} pixels",
         args.folder.display(),
         manifest.shots.len(),
         session.extent
     );
+    match check_gray_code(&args.folder) {
+        Ok(()) => eprintln!("{summary}; `ltm-export recover` takes this folder"),
+        Err(error) => {
+            eprintln!("warning: {}", error_with_remedy(&error));
+            eprintln!(
+                "{summary}; it cannot be recovered without \"correspondence\". Are --black, --white, --bin and --crop right?"
+            );
+        }
+    }
     Ok(())
 }
 
@@ -145,32 +156,23 @@ fn read_sequence(folder: &Path) -> Result<PatternSequence> {
     let read = || -> Result<PatternSequence> {
         let json = std::fs::read_to_string(&path)
             .context("cannot be read; is this a folder that `ltm-export patterns` wrote?")?;
-        let sequence = PatternSequence::parse(&json)?;
-        for SequencePicture { photo, .. } in &sequence.pictures {
-            let is_inside = Path::new(photo)
-                .components()
-                .all(|c| matches!(c, Component::Normal(_)));
-            ensure!(
-                is_inside,
-                "\"photo\" {photo:?} is not a path inside the folder"
-            );
-        }
-        Ok(sequence)
+        Ok(PatternSequence::parse(&json)?)
     };
     read().with_context(|| path.display().to_string())
 }
 
-/// Refuses to replace what an earlier call wrote.
-fn ensure_new(folder: &Path, sequence: &PatternSequence) -> Result<()> {
-    let written = sequence
-        .pictures
-        .iter()
-        .map(|picture| picture.photo.as_str());
-    for name in std::iter::once(MANIFEST_NAME).chain(written) {
+/// Refuses a folder that has something where the photographs will be: the result of an earlier call, or the user's own files.
+fn ensure_new(folder: &Path) -> Result<()> {
+    for name in FOLDERS.into_iter().chain([MANIFEST_NAME]) {
         let path = folder.join(name);
+        let is_empty = || {
+            path.read_dir()
+                .is_ok_and(|mut entries| entries.next().is_none())
+        };
         ensure!(
-            !path.exists(),
-            "{}: is there already; to assemble again, delete capture.json, photos/ and graycode/",
+            !path.exists() || is_empty(),
+            "{}: is there already, but assemble writes photos/, graycode/ and capture.json itself; move these out of the folder \
+             first",
             path.display()
         );
     }
@@ -197,20 +199,33 @@ impl Session {
     ) -> Result<Self> {
         let developed = TempDir::with_prefix_in(".ltm-export-", folder)
             .with_context(|| folder.display().to_string())?;
+        for folder in FOLDERS {
+            std::fs::create_dir(developed.path().join(folder)).context(folder)?;
+        }
         let cores = InterruptibleCores::listen()?;
         let bar = progress::bar("reading", paths.len());
         let read = |(i, path): (usize, &PathBuf)| -> Result<DevelopedPhotograph> {
-            cores.check_cancelled()?;
+            if cores.is_cancelled() {
+                bail!(Interrupted("interrupted: nothing is written".to_owned()));
+            }
             let mut photo = develop(path, settings)?;
             let bytes = bytemuck::cast_slice(&photo.codes);
-            let target = developed.path().join(format!("{i}.png"));
-            write_png(&target, photo.extent, bytes, ExtendedColorType::Rgb16)?;
+            // A photograph too many has no name.
+            if let Some(picture) = sequence.pictures.get(i) {
+                let target = developed.path().join(&picture.photo);
+                write_png(&target, photo.extent, bytes, ExtendedColorType::Rgb16)?;
+            }
             photo.codes = Vec::new();
             bar.inc(1);
             Ok(photo)
         };
+        // Each thread holds a whole photograph.
+        let threads = rayon::current_num_threads().min(MAX_READERS);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.context("threads cannot be started")?;
         let photos = paths.par_iter().enumerate().map(read);
-        let photos: Vec<DevelopedPhotograph> = photos.collect::<Result<_>>()?;
+        let photos = pool.install(|| photos.collect::<Result<Vec<DevelopedPhotograph>>>())?;
+        drop(bar);
         let extent = photos
             .first()
             .context("--photos names no photograph")?
@@ -220,6 +235,16 @@ impl Session {
                 "{}: has {} pixels, but {} has {extent}; photographs of one capture have one size",
                 paths[i].display(),
                 photos[i].extent,
+                paths[0].display()
+            );
+        }
+        if let Some(i) = photos
+            .iter()
+            .position(|photo| photo.is_eight_bit != photos[0].is_eight_bit)
+        {
+            bail!(
+                "{}: has 8 bits a sample, or {} has, but not both; export all photographs alike",
+                paths[i].display(),
                 paths[0].display()
             );
         }
@@ -242,21 +267,7 @@ impl Session {
     fn check_pairing(&self, force: bool) -> Result<Vec<String>> {
         let (photos, pictures) = (self.paths.len(), self.sequence.pictures.len());
         if photos != pictures {
-            let mut message = format!("there are {photos} photographs of {pictures} pictures");
-            if let Some(gap) = self.brightness.gap(&self.sequence) {
-                let (first, last) = (*gap.start(), *gap.end());
-                message += &match photos < pictures {
-                    true => format!(
-                        ": one is missing, of {}",
-                        range(&self.picture(first), &self.picture(last))
-                    ),
-                    false => format!(
-                        ": one is too many, {}",
-                        range(&self.path(first), &self.path(last))
-                    ),
-                };
-            }
-            bail!("{message}. Give one photograph for each picture of display/, in order");
+            bail!(wrong_count(photos, pictures, &self.gap_text()));
         }
         let faults = self.brightness.faults(&self.sequence);
         let texts: Vec<String> = faults
@@ -270,7 +281,32 @@ impl Session {
         if texts.len() > MAX_LISTED {
             message += &format!("; and {} more", texts.len() - MAX_LISTED);
         }
-        bail!("{message}. Is the order right? --force writes the capture nevertheless")
+        bail!(
+            "{message}. Are the photographs linear (see --response), neither too dark nor saturated, and in the order of the \
+             pictures? A camera that counts from 9999 to 0001 needs its photographs listed in order. --force writes the capture \
+             nevertheless"
+        )
+    }
+
+    /// Where a photograph is missing, or which may be too many.
+    fn gap_text(&self) -> String {
+        let Some(gap) = self.brightness.gap(&self.sequence) else {
+            return String::new();
+        };
+        let (first, last) = (*gap.start(), *gap.end());
+        if self.paths.len() > self.sequence.pictures.len() {
+            return format!(
+                ": one is too many, {}",
+                range(&self.path(first), &self.path(last))
+            );
+        }
+        let pictures = range(&self.picture(first), &self.picture(last));
+        let before = first
+            .checked_sub(1)
+            .map(|i| format!("after {}", self.path(i)));
+        let after = (last < self.paths.len()).then(|| format!("before {}", self.path(last)));
+        let place: Vec<String> = before.into_iter().chain(after).collect();
+        format!(": one is missing, of {pictures}, {}", place.join(" and "))
     }
 
     fn fault_text(&self, i: usize, fault: PairingFault) -> String {
@@ -286,7 +322,7 @@ impl Session {
             PairingFault::NotInverse(deviation) => format!(
                 "{path} is not the inverse of the photograph before, as {picture} is: their sum differs from the flood \
                  photograph by {:.0} %",
-                100.0 * deviation
+                (100.0 * deviation).min(999.0)
             ),
         }
     }
@@ -321,7 +357,7 @@ impl Session {
             let saturated = self.saturated_shares[*flood];
             if saturated > MAX_SATURATED {
                 eprintln!(
-                    "warning: {:.1} % of the samples of {} are saturated; expose less",
+                    "warning: {:.1} % of the samples of {} are saturated; expose less, unless --white is wrong",
                     100.0 * saturated,
                     self.path(*flood)
                 );
@@ -375,23 +411,28 @@ impl Session {
         (is_rising && response.len() > 2).then_some(response)
     }
 
-    /// Gives the photographs the names of the sequence.
-    fn move_into_place(&self, folder: &Path) -> Result<()> {
-        for (i, picture) in self.sequence.pictures.iter().enumerate() {
-            let target = folder.join(&picture.photo);
-            let rename = || -> Result<()> {
-                if let Some(parent) = target.parent() {
-                    std::fs::create_dir_all(parent)?;
-                }
-                Ok(std::fs::rename(
-                    self.developed.path().join(format!("{i}.png")),
-                    &target,
-                )?)
-            };
-            rename().with_context(|| target.display().to_string())?;
+    /// Moves the photographs into `folder`, and then `manifest`, without which it is no capture folder.
+    fn move_into_place(&self, folder: &Path, manifest: &Manifest) -> Result<()> {
+        let json = serde_json::to_string_pretty(manifest)?;
+        let developed = self.developed.path();
+        std::fs::write(developed.join(MANIFEST_NAME), json + "\n").context(MANIFEST_NAME)?;
+        for name in FOLDERS.into_iter().chain([MANIFEST_NAME]) {
+            let target = folder.join(name);
+            if target.is_dir() {
+                std::fs::remove_dir(&target).with_context(|| target.display().to_string())?; // it is empty
+            }
+            let moved = std::fs::rename(developed.join(name), &target);
+            moved.with_context(|| target.display().to_string())?;
         }
         Ok(())
     }
+}
+
+/// The message of a wrong number of photographs, with the `place` where one is missing or too many.
+fn wrong_count(photos: usize, pictures: usize, place: &str) -> String {
+    format!(
+        "there are {photos} photographs of {pictures} pictures{place}. Give one photograph for each picture of display/, in order"
+    )
 }
 
 /// Decodes some rows of the Gray code.
@@ -400,8 +441,9 @@ fn check_gray_code(folder: &Path) -> Result<()> {
     let _spinner = progress::spinner("decoding");
     let dark = folder.read_dark()?;
     let camera = folder.manifest().camera.extent();
-    let row = |i: u32| (u64::from(i) * u64::from(camera.height) / u64::from(GRAY_CODE_ROWS)) as u32;
-    let rows = (0..GRAY_CODE_ROWS.min(camera.height)).map(|i| row(i)..row(i) + 1);
+    let count = GRAY_CODE_ROWS.min(camera.height);
+    let row = |i: u32| (u64::from(i) * u64::from(camera.height) / u64::from(count)) as u32;
+    let rows = (0..count).map(|i| row(i)..row(i) + 1);
     let rows = CameraRowSet::from_strips(rows);
     let gray_code = folder.read_gray_code(&dark, &rows)?;
     let decoded = gray_code.correspondence(camera);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ImageReader, Limits};
 
 use super::photograph_list::is_photograph;
 use crate::capture::{CameraResponse, ManifestCamera};
@@ -63,6 +63,8 @@ pub struct DevelopedPhotograph {
     pub thumbnail: Vec<f64>,
     /// Share of the samples that are saturated.
     pub saturated_share: f64,
+    /// Whether the file has 8 bits a sample.
+    pub is_eight_bit: bool,
 }
 
 /// Reads and develops the photograph at `path`.
@@ -70,13 +72,28 @@ pub fn develop(path: &Path, settings: &DevelopSettings) -> Result<DevelopedPhoto
     read(path, settings).with_context(|| path.display().to_string())
 }
 
+/// Photographs of 600 megapixels are decoded; larger ones take too much memory.
+fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(4 << 30);
+    limits
+}
+
 fn read(path: &Path, settings: &DevelopSettings) -> Result<DevelopedPhotograph> {
-    let reader = ImageReader::open(path)?.with_guessed_format()?;
+    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    reader.limits(limits());
     ensure!(
         is_photograph(path),
         "is no PNG or TIFF; convert raw files to 16-bit linear TIFF first (docs/capture.md says how)"
     );
     let image = reader.decode().context("cannot be decoded")?;
+    ensure!(
+        !matches!(
+            image,
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
+        ),
+        "has floating-point samples; export integers of 16 bits"
+    );
     let is_eight_bit = matches!(
         image,
         DynamicImage::ImageLuma8(_)
@@ -104,7 +121,9 @@ fn read(path: &Path, settings: &DevelopSettings) -> Result<DevelopedPhotograph> 
     ensure!(
         u64::from(rect.x) + u64::from(crop_width) <= u64::from(width)
             && u64::from(rect.y) + u64::from(crop_height) <= u64::from(height),
-        "has {width}x{height} pixels, less than --crop says"
+        "has {width}x{height} pixels, but --crop keeps {crop_width}x{crop_height} from ({}, {}) on",
+        rect.x,
+        rect.y
     );
     let extent = Extent::new(crop_width / settings.bin, crop_height / settings.bin);
     ensure!(
@@ -113,7 +132,10 @@ fn read(path: &Path, settings: &DevelopSettings) -> Result<DevelopedPhotograph> 
         settings.bin
     );
     let code = |x: u32, y: u32| picture.get_pixel(rect.x + x, rect.y + y).0;
-    Ok(averaged(extent, settings, code))
+    Ok(DevelopedPhotograph {
+        is_eight_bit,
+        ..averaged(extent, settings, code)
+    })
 }
 
 /// Linearises codes and averages squares of them; `code` is that of a pixel before averaging.
@@ -165,6 +187,7 @@ fn averaged(
         extent,
         thumbnail: parts.map(|[sum, count]| sum / count).collect(),
         saturated_share: f64::from(saturated) / (codes.len() * CHANNELS) as f64,
+        is_eight_bit: false,
         codes,
     }
 }

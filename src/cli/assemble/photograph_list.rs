@@ -1,5 +1,6 @@
 //! The photographs of a session, in the order in which they were taken.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -11,6 +12,11 @@ const EXTENSIONS: [&str; 3] = ["png", "tif", "tiff"];
 pub fn photographs(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in paths {
+        ensure!(
+            path.exists(),
+            "{}: there is no such file or folder",
+            path.display()
+        );
         match path.is_dir() {
             true => files.extend(folder(path).with_context(|| path.display().to_string())?),
             false => files.push(path.clone()),
@@ -19,8 +25,12 @@ pub fn photographs(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Whether a file has the extension of a type that can be read.
+/// Whether a file has the extension of a type that can be read. Hidden files are others: macOS keeps notes in `._IMG_1.tif`.
 pub fn is_photograph(path: &Path) -> bool {
+    let is_hidden = |name: &OsStr| name.to_string_lossy().starts_with('.');
+    if path.file_name().is_some_and(is_hidden) {
+        return false;
+    }
     let extension = path
         .extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -45,7 +55,7 @@ fn folder(path: &Path) -> Result<Vec<PathBuf>> {
             .to_string_lossy()
             .into_owned()
     };
-    files.sort_by_cached_key(|file| natural_key(&name(file)));
+    files.sort_by_cached_key(|file| (natural_key(&name(file)), name(file)));
     Ok(files)
 }
 
@@ -75,6 +85,7 @@ mod tests {
             "IMG_9.TIF",
             "IMG_0100.png",
             "notes.txt",
+            "._IMG_9.TIF",
             "IMG_9b.tif",
         ] {
             std::fs::write(folder.path().join(name), "").unwrap();
@@ -88,7 +99,7 @@ mod tests {
         let empty = tempfile::TempDir::new().unwrap();
         assert!(photographs(&[empty.path().to_owned()]).is_err());
         // Single files keep their order.
-        let given = ["b.png", "a.png"].map(PathBuf::from);
+        let given = ["IMG_10.tif", "IMG_9.TIF"].map(|name| folder.path().join(name));
         assert_eq!(photographs(&given).unwrap(), given);
     }
 }

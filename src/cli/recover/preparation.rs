@@ -296,11 +296,14 @@ impl CapturePreparation<'_> {
         let found = match found {
             Err(RecoverError::Cancelled(cancelled)) => return Err(cancelled.into()),
             // The recovery has told, or will tell, why nothing can be estimated.
-            found => found.ok().flatten(),
+            found => found.unwrap_or_default(),
         };
         let declared = sample.folder.manifest();
-        let likely = found.map(|found| calibration::with_response(declared, found));
-        Ok(likely.filter(|likely| likely != declared))
+        let mut likely = found
+            .into_iter()
+            .map(|found| calibration::with_response(declared, found));
+        // Not every response has a name after the declared one.
+        Ok(likely.find(|likely| likely != declared))
     }
 
     /// Looks whether the display dims bright pictures.

@@ -48,8 +48,8 @@ pub enum ResponseHypothesis {
 
 use ResponseHypothesis as Hypothesis;
 
-/// Looks for a response with which the photographs `used` predict one another better than with the declared one;
-/// `mean_function` is `[slot]`, smoothed. `None` if there is none, or too little is measured to tell.
+/// Looks for responses with which the photographs `used` predict one another better than with the declared one, the best
+/// first; `mean_function` is `[slot]`, smoothed. Empty if there is none, or too little is measured to tell.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -59,12 +59,12 @@ pub(in crate::recover) fn find(
     mean_function: &[f64],
     used: &[usize],
     executor: &impl Executor,
-) -> Result<Option<ResponseHypothesis>, Cancelled> {
+) -> Result<Vec<ResponseHypothesis>, Cancelled> {
     let squares = mean_function::sample_squares(measurements);
     let step = squares.len().div_ceil(MAX_SQUARES).max(1);
     let squares: Vec<TileRect> = squares.into_iter().step_by(step).collect();
     if squares.len() < MIN_SQUARES || !(MIN_PHOTOGRAPHS..=MAX_PHOTOGRAPHS).contains(&used.len()) {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let search = ResponseSearch {
         measurements: CalibratedMeasurements::uncorrected(measurements),
@@ -75,6 +75,21 @@ pub(in crate::recover) fn find(
         executor,
     };
     search.run()
+}
+
+impl ResponseHypothesis {
+    /// Whether it differs from the declared response by more than estimates are accurate.
+    fn is_far(self) -> bool {
+        match self {
+            Self::Display {
+                exponent: parameter,
+            }
+            | Self::Camera(
+                CameraResponse::Gamma(parameter) | CameraResponse::Compression(parameter),
+            ) => libm::log(parameter).abs() > MIN_LOG_PARAMETER,
+            Self::Camera(_) => true,
+        }
+    }
 }
 
 struct ResponseSearch<'a, E> {
@@ -119,10 +134,9 @@ impl Scored {
 }
 
 impl<E: Executor> ResponseSearch<'_, E> {
-    fn run(&self) -> Result<Option<Hypothesis>, Cancelled> {
+    fn run(&self) -> Result<Vec<Hypothesis>, Cancelled> {
         let declared = Hypothesis::Camera(CameraResponse::Linear);
         let declared = self.score(declared);
-        let mut best = declared.clone();
         let camera = |exponent| Hypothesis::Camera(CameraResponse::Gamma(exponent));
         let mut candidates = vec![self.best_parameter(&declared, camera)?];
         // A curve that is nearly a power may also be that of compressed highlights.
@@ -146,25 +160,16 @@ impl<E: Executor> ResponseSearch<'_, E> {
             let display = |exponent| Hypothesis::Display { exponent };
             candidates.push(self.best_parameter(&declared, display)?);
         }
-        for candidate in candidates {
-            if candidate.mean() < best.mean() {
-                best = candidate;
-            }
-        }
-        let is_far = match best.hypothesis {
-            Hypothesis::Display {
-                exponent: parameter,
-            }
-            | Hypothesis::Camera(
-                CameraResponse::Gamma(parameter) | CameraResponse::Compression(parameter),
-            ) => libm::log(parameter).abs() > MIN_LOG_PARAMETER,
-            _ => true,
-        };
-        Ok((is_far && best.is_better_than(&declared)).then_some(best.hypothesis))
+        candidates.retain(|scored| scored.hypothesis.is_far() && scored.is_better_than(&declared));
+        candidates.sort_by(|a, b| a.mean().total_cmp(&b.mean()));
+        Ok(candidates
+            .into_iter()
+            .map(|scored| scored.hypothesis)
+            .collect())
     }
 
-    /// The exponent, or ratio of slopes, with the lowest prediction errors: by steps as long as these fall, then by parabolas through the three
-    /// best.
+    /// The exponent, or ratio of slopes, with the lowest prediction errors: by steps as long as these fall, then by parabolas
+    /// through the three best.
     fn best_parameter(
         &self,
         declared: &Scored,
@@ -346,7 +351,8 @@ mod tests {
         change(&mut capture.measurements);
         let window = capture.geometry.window;
         let found = find_response(&capture.measurements, window, &SequentialExecutor);
-        pollster::block_on(found).unwrap_or_else(|error| panic!("{error}"))
+        let found = pollster::block_on(found).unwrap_or_else(|error| panic!("{error}"));
+        found.first().copied()
     }
 
     fn change_samples(measurements: &mut Measurements, change: impl Fn(f32) -> f32) {
