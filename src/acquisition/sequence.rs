@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::display_layout::{DisplayLayout, DisplayLayoutError};
-use crate::calibrate::LightPlaneAxis;
 use crate::capture::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
 use crate::simulate::{
     GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, RandomStreamId,
@@ -34,14 +33,7 @@ pub enum PictureRole {
         code: u8,
     },
     /// A bit of the Gray code: the correspondence.
-    GrayCode {
-        /// Whether it numbers columns or rows.
-        axis: LightPlaneAxis,
-        /// Bit number, 0 the least significant.
-        bit: u32,
-        /// Whether dark and bright are exchanged.
-        inverted: bool,
-    },
+    GrayCode(GrayCodePattern),
     /// A random pattern.
     Pattern {
         /// File with a pixel for each light element.
@@ -138,17 +130,10 @@ impl PatternSequence {
             show(PictureRole::Ramp { code }, uniform(code));
         }
         for pattern in GrayCodePattern::all(light) {
-            let GrayCodePattern {
-                axis,
-                bit,
-                inverted,
-            } = pattern;
-            let role = PictureRole::GrayCode {
-                axis,
-                bit,
-                inverted,
-            };
-            show(role, grey_codes(pattern.codes(light)));
+            show(
+                PictureRole::GrayCode(pattern),
+                grey_codes(pattern.codes(light)),
+            );
         }
         for i in 0..settings.patterns {
             if i > 0 && i % REFERENCE_INTERVAL == 0 {
@@ -168,29 +153,21 @@ impl PatternSequence {
             std::mem::discriminant(&picture.role) == std::mem::discriminant(&role)
         };
         let i = self.pictures.iter().filter(of_role).count();
-        let (folder, name) = match &role {
-            PictureRole::Dark => ("photos", "dark".to_owned()),
-            PictureRole::Flood => ("photos", "flood".to_owned()),
-            PictureRole::Ramp { code } => ("photos", format!("ramp-{code:03}")),
-            PictureRole::Reference => ("photos", format!("reference-{i:04}")),
-            PictureRole::Pattern { .. } => ("photos", format!("{i:04}")),
-            PictureRole::GrayCode {
-                axis,
-                bit,
-                inverted,
-            } => {
-                let sign = if *inverted { 'n' } else { 'p' };
-                ("graycode", format!("{axis}{bit}{sign}"))
-            }
+        let photo = match &role {
+            PictureRole::Dark => "photos/dark.png".to_owned(),
+            PictureRole::Flood => "photos/flood.png".to_owned(),
+            PictureRole::Ramp { code } => format!("photos/ramp-{code:03}.png"),
+            PictureRole::Reference => format!("photos/reference-{i:04}.png"),
+            PictureRole::Pattern { .. } => format!("photos/{i:04}.png"),
+            PictureRole::GrayCode(pattern) => pattern.shot().photo,
         };
         let label = match &role {
-            PictureRole::Pattern { .. } => format!("pattern-{name}"),
-            PictureRole::GrayCode { .. } => format!("graycode-{name}"),
-            _ => name.clone(),
+            PictureRole::Pattern { .. } => photo.replace("photos/", "pattern-"),
+            _ => photo.replace("photos/", "").replace('/', "-"),
         };
         self.pictures.push(SequencePicture {
-            picture: format!("display/{:04}-{label}.png", self.pictures.len()),
-            photo: format!("{folder}/{name}.png"),
+            picture: format!("display/{:04}-{label}", self.pictures.len()),
+            photo,
             role,
         });
     }
@@ -238,7 +215,7 @@ impl PatternSequence {
         let mut seen = HashSet::new();
         for (index, picture) in self.pictures.iter().enumerate() {
             let photos = match picture.role {
-                PictureRole::GrayCode { .. } => "graycode",
+                PictureRole::GrayCode(_) => "graycode",
                 _ => "photos",
             };
             let mut paths = vec![("display", &picture.picture), (photos, &picture.photo)];
@@ -285,15 +262,9 @@ impl PatternSequence {
                 PictureRole::Dark => manifest.dark = Some(photo),
                 PictureRole::Flood => manifest.flood = Some(photo),
                 PictureRole::Ramp { .. } | PictureRole::Reference => {}
-                PictureRole::GrayCode {
-                    axis,
-                    bit,
-                    inverted,
-                } => manifest.graycode.push(GrayCodeShot {
+                PictureRole::GrayCode(pattern) => manifest.graycode.push(GrayCodeShot {
                     photo,
-                    axis: *axis,
-                    bit: *bit,
-                    inverted: *inverted,
+                    ..pattern.shot()
                 }),
                 PictureRole::Pattern { pattern } => manifest.shots.push(Shot {
                     pattern: pattern.clone(),

@@ -7,7 +7,7 @@
 use std::ops::RangeInclusive;
 
 use super::sequence::{PatternSequence, PictureRole};
-use crate::calibrate::LightPlaneAxis;
+use crate::simulate::GrayCodePattern;
 
 /// Largest brightness of the dark photograph, relative to the flood's. Room light must be less.
 const MAX_DARK: f64 = 0.25;
@@ -115,12 +115,12 @@ impl SequenceBrightness {
                     }
                     last_step = step;
                 }
-                &PictureRole::GrayCode {
-                    axis,
-                    bit,
-                    inverted: true,
-                } => {
-                    let Some(plain) = photo_of(&plain_role(axis, bit)) else {
+                PictureRole::GrayCode(pattern) if pattern.inverted => {
+                    let plain = GrayCodePattern {
+                        inverted: false,
+                        ..*pattern
+                    };
+                    let Some(plain) = photo_of(&PictureRole::GrayCode(plain)) else {
                         continue;
                     };
                     let parts = thumbnail(photo).iter().zip(thumbnail(plain));
@@ -138,14 +138,6 @@ impl SequenceBrightness {
             }
         }
         faults
-    }
-}
-
-fn plain_role(axis: LightPlaneAxis, bit: u32) -> PictureRole {
-    PictureRole::GrayCode {
-        axis,
-        bit,
-        inverted: false,
     }
 }
 

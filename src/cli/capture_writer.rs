@@ -8,28 +8,10 @@ use anyhow::{Context, Result};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use crate::capture::GrayCodeShot;
-use crate::simulate::GrayCodePattern;
 use crate::transport::Extent;
 
 /// With more electrons photon noise is far below a code, and Poisson sampling loses precision.
 pub const MAX_ELECTRONS: u64 = 1_000_000_000_000;
-
-/// The manifest's entry of a Gray code pattern, with the name of its photograph.
-pub fn gray_code_shot(pattern: GrayCodePattern) -> GrayCodeShot {
-    let GrayCodePattern {
-        axis,
-        bit,
-        inverted,
-    } = pattern;
-    let sign = if inverted { 'n' } else { 'p' };
-    GrayCodeShot {
-        photo: format!("graycode/{axis}{bit}{sign}.png"),
-        axis,
-        bit,
-        inverted,
-    }
-}
 
 /// Writes a PNG.
 pub fn write_png(

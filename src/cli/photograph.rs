@@ -7,9 +7,10 @@ use clap::Args;
 use image::ExtendedColorType;
 use rayon::prelude::*;
 
-use super::capture_writer::{MAX_ELECTRONS, gray_code_shot, write_png};
+use super::assemble::read_sequence;
+use super::capture_writer::{MAX_ELECTRONS, write_png};
 use super::{output_folder, progress};
-use crate::acquisition::{PatternSequence, PictureRole, SEQUENCE_NAME};
+use crate::acquisition::{PictureRole, SEQUENCE_NAME};
 use crate::capture::{
     CaptureFolder, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, ManifestCamera, Pattern, Shot,
 };
@@ -75,16 +76,12 @@ pub fn write_capture(args: &PhotographArgs) -> Result<usize> {
 /// Writes a photograph of each picture of the sequence in `folder`.
 fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
     let truth = known_transport(args, &CaptureFolder::open(&args.capture)?)?;
-    let path = folder.join(SEQUENCE_NAME);
-    let read = || -> Result<PatternSequence> {
-        Ok(PatternSequence::parse(&std::fs::read_to_string(&path)?)?)
-    };
-    let sequence = read().with_context(|| path.display().to_string())?;
+    let sequence = read_sequence(folder)?;
     let layout = sequence.layout;
     ensure!(
         layout.light == truth.light_plane,
         "{}: has {} light elements, but the transport of {} has {}",
-        path.display(),
+        folder.join(SEQUENCE_NAME).display(),
         layout.light,
         args.capture.display(),
         truth.light_plane
@@ -119,21 +116,25 @@ fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
         );
     }
     // What displays do to patterns in particular.
-    let is_pattern = |i: &usize| matches!(sequence.pictures[*i].role, PictureRole::Pattern { .. });
-    let (patterns, others): (Vec<usize>, Vec<usize>) = (0..emissions.len()).partition(is_pattern);
-    let select = |indices: &[usize]| -> Vec<Vec<f32>> {
-        indices.iter().map(|&i| emissions[i].clone()).collect()
+    let is_pattern = |(i, _): &(usize, Vec<f32>)| {
+        matches!(sequence.pictures[*i].role, PictureRole::Pattern { .. })
     };
-    let (mut lights, mut other_lights) = (select(&patterns), select(&others));
+    let numbered = emissions.into_iter().enumerate();
+    let (patterns, others): (Vec<_>, Vec<_>) = numbered.partition(is_pattern);
+    let order: Vec<usize> = patterns.iter().chain(&others).map(|(i, _)| *i).collect();
+    let [mut lights, mut other_lights] =
+        [patterns, others].map(|list| list.into_iter().map(|(_, light)| light).collect::<Vec<_>>());
     let mut random = RandomStreamId::Fault.start(args.seed);
     for fault in &args.faults {
         fault.change_emissions(layout.light, &mut lights, &mut other_lights, &mut random);
     }
-    let order = patterns.into_iter().chain(others);
-    let mut shown: Vec<(usize, Vec<f32>)> =
-        order.zip(lights.into_iter().chain(other_lights)).collect();
-    shown.sort_by_key(|(i, _)| *i);
-    let emissions: Vec<Vec<f32>> = shown.into_iter().map(|(_, light)| light).collect();
+    let mut emissions = vec![Vec::new(); order.len()];
+    for (i, light) in order
+        .into_iter()
+        .zip(lights.into_iter().chain(other_lights))
+    {
+        emissions[i] = light;
+    }
     let channels: Vec<_> = (0..CHANNELS)
         .map(|c| channel_pictures(&truth, c, &emissions))
         .collect();
@@ -276,7 +277,7 @@ fn photograph(
         .map(|i| format!("photos/{i:04}.png"))
         .collect();
     names.extend(["photos/dark.png", "photos/flood.png"].map(str::to_owned));
-    manifest.graycode = gray_code.iter().copied().map(gray_code_shot).collect();
+    manifest.graycode = gray_code.iter().map(|code| code.shot()).collect();
     names.extend(manifest.graycode.iter().map(|shot| shot.photo.clone()));
     pictures.append(&mut others);
     let named: Vec<(String, LinearPhoto)> = names.into_iter().zip(pictures).collect();

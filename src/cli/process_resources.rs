@@ -42,6 +42,12 @@ pub const INTERRUPTED_STATUS: u8 = 130;
 #[error("{0}")]
 pub struct Interrupted(pub String);
 
+/// A pool of so many threads.
+pub fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.context("threads cannot be started")
+}
+
 /// Runs jobs on all cores until Ctrl-C or SIGTERM asks the process to stop. The second signal ends it at once. The default
 /// has no signal handlers: the first signal ends the process.
 #[derive(Debug, Default)]

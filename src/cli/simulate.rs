@@ -12,7 +12,7 @@ use image::ExtendedColorType;
 use npyz::{NpyWriter, WriterBuilder};
 use rayon::prelude::*;
 
-use super::capture_writer::{MAX_ELECTRONS, gray_code_shot, write_png};
+use super::capture_writer::{MAX_ELECTRONS, write_png};
 use super::report::format_bytes;
 use super::value_parsers::parse_extent;
 use super::{output_folder, progress};
@@ -141,7 +141,7 @@ impl<'a> SimulationPlan<'a> {
             plan.photograph(codes, format!("photos/{name}.png"), None);
         }
         for code in GrayCodePattern::all(args.light) {
-            let shot = gray_code_shot(code);
+            let shot = code.shot();
             plan.photograph(code.codes(args.light), shot.photo.clone(), None);
             plan.manifest.graycode.push(shot);
         }

@@ -2,8 +2,10 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use serde::{Deserialize, Serialize};
 
 use crate::calibrate::LightPlaneAxis;
+use crate::capture::GrayCodeShot;
 use crate::transport::Extent;
 
 /// The monitor emits `(code / 255)^MONITOR_GAMMA`.
@@ -68,7 +70,7 @@ impl PatternEnsemble {
 }
 
 /// One pattern of the Gray code of all columns or of all rows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GrayCodePattern {
     /// Whether it codes columns or rows.
     pub axis: LightPlaneAxis,
@@ -95,6 +97,22 @@ impl GrayCodePattern {
             }
         }
         patterns
+    }
+
+    /// The manifest's entry of the pattern, with the name of its photograph.
+    pub fn shot(self) -> GrayCodeShot {
+        let Self {
+            axis,
+            bit,
+            inverted,
+        } = self;
+        let sign = if inverted { 'n' } else { 'p' };
+        GrayCodeShot {
+            photo: format!("graycode/{axis}{bit}{sign}.png"),
+            axis,
+            bit,
+            inverted,
+        }
     }
 
     /// The codes of the pattern.

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 use self::photograph_file::{DevelopSettings, DevelopedPhotograph, develop};
 use super::advice::error_with_remedy;
 use super::capture_writer::write_png;
-use super::process_resources::{Interrupted, InterruptibleCores};
+use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
 use super::progress;
 use super::value_parsers::UsageError;
 use crate::acquisition::{
@@ -151,7 +151,8 @@ pub fn run(args: &AssembleArgs) -> Result<()> {
     Ok(())
 }
 
-fn read_sequence(folder: &Path) -> Result<PatternSequence> {
+/// The sequence in a folder that `patterns` wrote.
+pub fn read_sequence(folder: &Path) -> Result<PatternSequence> {
     let path = folder.join(SEQUENCE_NAME);
     let read = || -> Result<PatternSequence> {
         let json = std::fs::read_to_string(&path)
@@ -221,10 +222,9 @@ impl Session {
         };
         // Each thread holds a whole photograph.
         let threads = rayon::current_num_threads().min(MAX_READERS);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.context("threads cannot be started")?;
         let photos = paths.par_iter().enumerate().map(read);
-        let photos = pool.install(|| photos.collect::<Result<Vec<DevelopedPhotograph>>>())?;
+        let photos = thread_pool(threads)?
+            .install(|| photos.collect::<Result<Vec<DevelopedPhotograph>>>())?;
         drop(bar);
         let extent = photos
             .first()

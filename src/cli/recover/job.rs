@@ -18,7 +18,7 @@ use super::report::{RecoverReport, photograph_reports};
 use crate::capture::{CaptureFolder, DefectivePixels};
 use crate::cli::measurement_reader::MeasurementReader;
 use crate::cli::output_file::{LTM, OutputFile};
-use crate::cli::process_resources::peak_rss_bytes;
+use crate::cli::process_resources::{peak_rss_bytes, thread_pool};
 use crate::cli::progress;
 use crate::export::{self, Provenance};
 use crate::format::{EncodedFile, FormatError, Metadata};
@@ -218,9 +218,4 @@ impl RecoverJob<'_> {
             }
         })
     }
-}
-
-pub fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.context("threads cannot be started")
 }

@@ -22,9 +22,9 @@ pub use self::messages::StrictError;
 pub use self::report::RecoverReport;
 
 use self::capture_sample::SampleSource;
-use self::job::{RecoverJob, thread_pool};
+use self::job::RecoverJob;
 use super::output_file::{LTM, OutputFile};
-use super::process_resources::InterruptibleCores;
+use super::process_resources::{InterruptibleCores, thread_pool};
 use super::report::print_json;
 use super::value_parsers::UsageError;
 use crate::capture::CaptureFolder;

@@ -4,8 +4,8 @@
 //! bright, so that this shows in one photograph only, the flood: it is darker than the patterns predict. Its brightness
 //! relative to its prediction is found by regression over sampled pixels.
 
-use super::equations::{for_largest_window, predict};
-use super::resampling::{ResampledPhotographs, ResamplingInput};
+use super::equations::{for_scaled_pixels, predict};
+use super::resampling::ResamplingInput;
 use super::window_covariance::WindowModel;
 use crate::job_executor::Executor;
 use crate::recover::mean_function;
@@ -59,37 +59,22 @@ fn relative_brightness([pp, pu, uu, py, uy]: Sums) -> f64 {
 
 fn square_sums(input: ResamplingInput<'_>, square: TileRect) -> Sums {
     let mut sums = [0.0; 5];
-    let resampled = ResampledPhotographs::of_region(input, square);
-    let measurements = input.calibrated(resampled.as_ref());
-    let geometry = input.geometry;
-    for_largest_window(geometry, square, |origin, pixels| {
-        for (plane, channels) in measurements.planes() {
-            let model = WindowModel::new(
-                &measurements,
-                geometry,
-                input.mean_function,
-                origin,
-                plane,
-                input.used,
+    for_scaled_pixels(input, square, |origin, window, pixels| {
+        let flood = WindowModel::of_flood(input.geometry, input.mean_function, origin);
+        for scaled in pixels {
+            let measured = input
+                .measurements
+                .flood_sample(scaled.pixel, scaled.channel);
+            if measured.is_nan() {
+                continue;
+            }
+            let (p, u, y) = (
+                predict(window, &flood, scaled)[0],
+                scaled.unit,
+                scaled.unit * measured,
             );
-            let window = model.with_pixels(&measurements, input.used, pixels, channels);
-            let flood = WindowModel::of_flood(geometry, input.mean_function, origin);
-            for (window, scaled) in window
-                .iter()
-                .flat_map(|(window, pixels)| pixels.iter().map(move |p| (window, p)))
-            {
-                let measured = measurements.flood_sample(scaled.pixel, scaled.channel);
-                if measured.is_nan() {
-                    continue;
-                }
-                let (p, u, y) = (
-                    predict(window, &flood, scaled)[0],
-                    scaled.unit,
-                    scaled.unit * measured,
-                );
-                for (sum, product) in sums.iter_mut().zip([p * p, p * u, u * u, p * y, u * y]) {
-                    *sum += product;
-                }
+            for (sum, product) in sums.iter_mut().zip([p * p, p * u, u * u, p * y, u * y]) {
+                *sum += product;
             }
         }
     });

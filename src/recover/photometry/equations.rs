@@ -115,6 +115,32 @@ pub(super) fn for_largest_window(
     }
 }
 
+/// Gives the largest window of a square with its scaled pixels, from corrected photographs; once for each plane.
+pub(super) fn for_scaled_pixels(
+    input: ResamplingInput<'_>,
+    square: TileRect,
+    mut visit: impl FnMut(LightElement, &WindowCovariance, &[ScaledPixel]),
+) {
+    let resampled = ResampledPhotographs::of_region(input, square);
+    let measurements = input.calibrated(resampled.as_ref());
+    for_largest_window(input.geometry, square, |origin, pixels| {
+        for (plane, channels) in measurements.planes() {
+            let model = WindowModel::new(
+                &measurements,
+                input.geometry,
+                input.mean_function,
+                origin,
+                plane,
+                input.used,
+            );
+            let window = model.with_pixels(&measurements, input.used, pixels, channels);
+            if let Some((window, pixels)) = window {
+                visit(origin, &window, &pixels);
+            }
+        }
+    });
+}
+
 /// Upper bound on the memory that [`fit`] takes for so many photographs, in bytes: the sums of each part, those of all,
 /// and for each part the model of a window.
 pub(in crate::recover) fn max_bytes(window: Window, photographs: usize) -> usize {

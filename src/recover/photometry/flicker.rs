@@ -6,9 +6,8 @@
 //! band of rows, relative to the rest, and of each band of columns. Functions that differ from the model cause errors along
 //! both axes alike; flicker does along one.
 
-use super::equations::for_largest_window;
-use super::resampling::{ResampledPhotographs, ResamplingInput};
-use super::window_covariance::WindowModel;
+use super::equations::for_scaled_pixels;
+use super::resampling::ResamplingInput;
 use crate::job_executor::Executor;
 use crate::linalg;
 use crate::recover::mean_function;
@@ -118,32 +117,16 @@ impl BandErrors {
 fn square_sums(input: ResamplingInput<'_>, square: TileRect) -> SquareSums {
     let count = input.used.len();
     let mut sums = vec![[0.0; 2]; count];
-    let resampled = ResampledPhotographs::of_region(input, square);
-    let measurements = input.calibrated(resampled.as_ref());
-    for_largest_window(input.geometry, square, |origin, pixels| {
-        for (plane, channels) in measurements.planes() {
-            let model = WindowModel::new(
-                &measurements,
-                input.geometry,
-                input.mean_function,
-                origin,
-                plane,
-                input.used,
-            );
-            let scaled = model.with_pixels(&measurements, input.used, pixels, channels);
-            let Some((window, pixels)) = scaled else {
-                continue;
-            };
-            let mut solved = vec![0.0; count];
-            for pixel in &pixels {
-                let residual = pixel.residual(&window.model.means);
-                linalg::multiply_vector(&window.inverse, &residual, &mut solved);
-                for (i, [product, weight]) in sums.iter_mut().enumerate() {
-                    let error = solved[i] / window.inverse[i * count + i];
-                    let predicted = pixel.y[i] - error;
-                    *product += error * predicted;
-                    *weight += predicted * predicted;
-                }
+    let mut solved = vec![0.0; count];
+    for_scaled_pixels(input, square, |_, window, pixels| {
+        for pixel in pixels {
+            let residual = pixel.residual(&window.model.means);
+            linalg::multiply_vector(&window.inverse, &residual, &mut solved);
+            for (i, [product, weight]) in sums.iter_mut().enumerate() {
+                let error = solved[i] / window.inverse[i * count + i];
+                let predicted = pixel.y[i] - error;
+                *product += error * predicted;
+                *weight += predicted * predicted;
             }
         }
     });
