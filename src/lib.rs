@@ -10,6 +10,7 @@
 //! |---|---|---|---|
 //! | [`acquisition`] | a display and an object | what to show, and which photograph shows what | `simulate` |
 //! | [`simulate`] | a built-in scene | photographs with known transport | `simulate` |
+//! | [`photo_file`] | a raw file or a picture | samples | `photo_file` |
 //! | [`capture`] | a capture folder | linear measurements | `capture` for files |
 //! | [`calibrate`] | photographs of Gray code | the correspondence | |
 //! | [`recover`] | measurements | light transport functions | |
@@ -32,6 +33,8 @@ pub mod export;
 pub mod format;
 pub mod job_executor;
 mod linalg;
+#[cfg(all(feature = "photo_file", not(target_arch = "wasm32")))]
+pub mod photo_file;
 pub mod recover;
 pub mod relight;
 #[cfg(feature = "simulate")]

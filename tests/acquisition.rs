@@ -3,118 +3,15 @@
 #![allow(clippy::unwrap_used)] // a panic fails the test
 
 mod common;
+mod session;
 
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
 use common::copy_folder;
-
-fn run(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
-    command.args(arguments).output().unwrap()
-}
-
-fn stderr_text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn succeed(arguments: &[&str]) -> Output {
-    let output = run(arguments);
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        stderr_text(&output)
-    );
-    output
-}
-
-/// An object, the sequence that a display shows, and its photographs.
-struct Session {
-    folder: TempDir,
-}
-
-impl Session {
-    fn new() -> Self {
-        let session = Self {
-            folder: TempDir::new().unwrap(),
-        };
-        let [object, sequence, photos] =
-            ["object", "sequence", "photos"].map(|name| session.text(name));
-        let size = ["--camera", "48x48", "--light", "24x24"];
-        succeed(
-            &[
-                &[
-                    "simulate",
-                    "stained-glass",
-                    "-o",
-                    &object,
-                    "--patterns",
-                    "1",
-                ],
-                &size[..],
-            ]
-            .concat(),
-        );
-        let display = [
-            "--screen",
-            "200x150",
-            "--light",
-            "24x24",
-            "--patterns",
-            "48",
-        ];
-        succeed(&[&["patterns", "-o", &sequence], &display[..]].concat());
-        succeed(&[
-            "photograph",
-            &object,
-            "--sequence",
-            &sequence,
-            "-o",
-            &photos,
-        ]);
-        session
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn text(&self, name: &str) -> String {
-        self.path(name).to_str().unwrap().to_owned()
-    }
-
-    /// The photograph of picture `i`.
-    fn photo(&self, i: usize) -> PathBuf {
-        self.path(&format!("photos/IMG_{:04}.png", i + 1))
-    }
-
-    fn assemble(&self, more: &[&str]) -> Output {
-        let [sequence, photos] = ["sequence", "photos"].map(|name| self.text(name));
-        let levels = ["--black", "512", "--white", "60000"];
-        run(&[
-            &["assemble", &sequence, "--photos", &photos],
-            &levels[..],
-            more,
-        ]
-        .concat())
-    }
-
-    fn refusal(&self) -> String {
-        let output = self.assemble(&[]);
-        assert_eq!(output.status.code(), Some(1));
-        assert!(!self.path("sequence/capture.json").exists());
-        assert!(!self.path("sequence/photos").exists());
-        stderr_text(&output)
-    }
-
-    fn manifest(&self) -> Value {
-        serde_json::from_slice(&fs::read(self.path("sequence/capture.json")).unwrap()).unwrap()
-    }
-}
+use session::{Session, run, stderr_text, succeed};
 
 #[test]
 fn a_session_becomes_a_capture_that_is_recovered() {
@@ -219,7 +116,7 @@ fn wrong_input_is_named_with_its_remedy() {
         ),
         (
             &["assemble", &sequence, "--photos", &sequence],
-            "no PNG or TIFF files",
+            "has no raw, PNG, TIFF or OpenEXR files",
         ),
         (
             &["assemble", &sequence, "--photos", "none.png"],
@@ -281,10 +178,12 @@ fn wrong_input_is_named_with_its_remedy() {
     arguments.extend(names.iter().map(String::as_str));
     let message = error(&arguments);
     assert!(
-        message.contains("IMG_0004.CR2: is no PNG or TIFF"),
+        message.contains("IMG_0004.CR2: dcraw_emu cannot convert it"),
         "{message}"
     );
-    // One file of a folder cannot be told from a sidecar.
+    assert!(session.refusal().contains("has raw files beside PNG"));
+    // Another file of a folder is no photograph.
+    fs::rename(&raw, photo.with_extension("JPG")).unwrap();
     assert!(session.refusal().contains("one is missing"));
     fs::create_dir(session.path("sequence/photos")).unwrap();
     fs::write(session.path("sequence/photos/mine.tif"), "").unwrap();
@@ -337,7 +236,7 @@ fn photographs_of_other_types_are_read() {
         "srgb",
     ]);
     assert!(
-        stderr_text(&mixed).contains("but not both"),
+        stderr_text(&mixed).contains("export all photographs alike"),
         "{}",
         stderr_text(&mixed)
     );

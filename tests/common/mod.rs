@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 pub mod relit;
+pub mod tiff_writer;
 
 use std::fs;
 use std::path::Path;

@@ -20,7 +20,9 @@ use super::value_parsers::UsageError;
 use crate::acquisition::{
     PairingFault, PatternSequence, PictureRole, SEQUENCE_NAME, SequenceBrightness,
 };
-use crate::capture::{CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME, Manifest};
+use crate::capture::{
+    CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME, Manifest, ManifestCamera,
+};
 use crate::job_executor::Executor;
 use crate::transport::{Extent, TileRect};
 
@@ -34,6 +36,8 @@ const GRAY_CODE_ROWS: u32 = 64;
 const MAX_LISTED: usize = 5;
 /// Share of the samples of the flood photograph that may be saturated.
 const MAX_SATURATED: f64 = 0.001;
+/// Share of the samples of a photograph that may be too far below black for a code.
+const MAX_CLIPPED: f64 = 0.001;
 /// Brightness of the brightest part of the flood photograph, relative to white, below which noise is needlessly high.
 const MIN_FLOOD: f64 = 0.3;
 /// Change of the reference photographs' brightness that is worth a note.
@@ -47,20 +51,21 @@ pub struct AssembleArgs {
     /// Folder that `ltm-export patterns` wrote
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Photographs in the order in which they were taken, or a folder of them, which is sorted by the numbers in their names: PNG or TIFF of 16
-    /// bits, linear
+    /// Photographs in the order in which they were taken, or a folder of them, which is sorted by the numbers in their names: a camera's raw
+    /// files, or linear PNG, TIFF or OpenEXR
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     photos: Vec<PathBuf>,
     /// Tone curve of the photographs: linear, srgb, or gamma=2.2; must be given for 8 bits [default: linear]
     #[arg(long, value_name = "CURVE", value_parser = parse_response)]
     response: Option<CameraResponse>,
-    /// Code without light, as of 16 bits
-    #[arg(long, value_name = "CODE", default_value_t = 0)]
-    black: u16,
-    /// Code of saturated samples, as of 16 bits
-    #[arg(long, value_name = "CODE", default_value_t = 65_535)]
-    white: u16,
-    /// Average squares of N x N pixels
+    /// Sample without light: a code of 16 bits, or a floating-point number; not for raw files [default: 0]
+    #[arg(long, value_name = "NUMBER", value_parser = parse_level, allow_negative_numbers = true)]
+    black: Option<f64>,
+    /// Sample from which on light is saturated: a code of 16 bits, or a floating-point number [default: 65535; 65000 of raw files, 1 of
+    /// floating-point samples]
+    #[arg(long, value_name = "NUMBER", value_parser = parse_level)]
+    white: Option<f64>,
+    /// Average squares of N x N pixels; a raw file has one pixel for each 2 x 2 of the sensor
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     bin: u32,
     /// Keep a part of the picture, in pixels before averaging
@@ -85,6 +90,11 @@ fn parse_response(text: &str) -> Result<CameraResponse, String> {
     }
 }
 
+fn parse_level(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| "it must be a number".to_owned())
+}
+
 fn parse_rect(text: &str) -> Result<TileRect, String> {
     let parse = || {
         let (x, rest) = text.split_once(',')?;
@@ -105,7 +115,10 @@ fn parse_rect(text: &str) -> Result<TileRect, String> {
 }
 
 pub fn run(args: &AssembleArgs) -> Result<()> {
-    if args.white <= args.black {
+    if args
+        .white
+        .is_some_and(|white| white <= args.black.unwrap_or(0.0))
+    {
         bail!(UsageError("--white must be above --black"));
     }
     let sequence = read_sequence(&args.folder)?;
@@ -117,8 +130,8 @@ pub fn run(args: &AssembleArgs) -> Result<()> {
     }
     let settings = DevelopSettings {
         response: args.response,
-        black: f64::from(args.black),
-        white: f64::from(args.white),
+        black: args.black,
+        white: args.white,
         bin: args.bin,
         crop: args.crop,
     };
@@ -128,16 +141,15 @@ pub fn run(args: &AssembleArgs) -> Result<()> {
         .iter()
         .for_each(|fault| eprintln!("warning: {fault}"));
     session.note_exposure();
+    session.warn_of_clipping();
     let response = session.display_response();
-    let manifest = session
-        .sequence
-        .manifest(settings.camera(session.extent), response);
+    let manifest = session.sequence.manifest(session.camera.clone(), response);
     session.move_into_place(&args.folder, &manifest)?;
     let summary = format!(
         "{}: {} shots of {} pixels",
         args.folder.display(),
         manifest.shots.len(),
-        session.extent
+        session.camera.extent()
     );
     match check_gray_code(&args.folder) {
         Ok(()) => eprintln!("{summary}; `ltm-export recover` takes this folder"),
@@ -184,11 +196,15 @@ fn ensure_new(folder: &Path) -> Result<()> {
 struct Session {
     sequence: PatternSequence,
     paths: Vec<PathBuf>,
-    extent: Extent,
+    /// Size and levels of the developed photographs.
+    camera: ManifestCamera,
     /// Holds the developed photographs, by their numbers.
     developed: TempDir,
     brightness: SequenceBrightness,
     saturated_shares: Vec<f64>,
+    clipped_shares: Vec<f64>,
+    /// Of each photograph, the sample below white at which many pile up.
+    piles: Vec<Option<f64>>,
 }
 
 impl Session {
@@ -209,12 +225,22 @@ impl Session {
             if cores.is_cancelled() {
                 bail!(Interrupted("interrupted: nothing is written".to_owned()));
             }
-            let mut photo = develop(path, settings)?;
+            let developed_photo = develop(path, settings, developed.path());
+            // An interruption ends the converter of raw files as well, which is no fault of the photograph.
+            if developed_photo.is_err() && cores.is_cancelled() {
+                bail!(Interrupted("interrupted: nothing is written".to_owned()));
+            }
+            let mut photo = developed_photo?;
             let bytes = bytemuck::cast_slice(&photo.codes);
             // A photograph too many has no name.
             if let Some(picture) = sequence.pictures.get(i) {
                 let target = developed.path().join(&picture.photo);
-                write_png(&target, photo.extent, bytes, ExtendedColorType::Rgb16)?;
+                write_png(
+                    &target,
+                    photo.camera.extent(),
+                    bytes,
+                    ExtendedColorType::Rgb16,
+                )?;
             }
             photo.codes = Vec::new();
             bar.inc(1);
@@ -226,34 +252,36 @@ impl Session {
         let photos = thread_pool(threads)?
             .install(|| photos.collect::<Result<Vec<DevelopedPhotograph>>>())?;
         drop(bar);
-        let extent = photos
-            .first()
-            .context("--photos names no photograph")?
-            .extent;
-        if let Some(i) = photos.iter().position(|photo| photo.extent != extent) {
+        let first = photos.first().context("--photos names no photograph")?;
+        let (camera, kind) = (first.camera.clone(), first.kind);
+        let extent = camera.extent();
+        if let Some(i) = photos
+            .iter()
+            .position(|photo| photo.camera.extent() != extent)
+        {
             bail!(
                 "{}: has {} pixels, but {} has {extent}; photographs of one capture have one size",
                 paths[i].display(),
-                photos[i].extent,
+                photos[i].camera.extent(),
                 paths[0].display()
             );
         }
-        if let Some(i) = photos
-            .iter()
-            .position(|photo| photo.is_eight_bit != photos[0].is_eight_bit)
-        {
+        if let Some(i) = photos.iter().position(|photo| photo.kind != kind) {
             bail!(
-                "{}: has 8 bits a sample, or {} has, but not both; export all photographs alike",
+                "{}: has {}, but {} has {kind}; export all photographs alike",
                 paths[i].display(),
+                photos[i].kind,
                 paths[0].display()
             );
         }
         Ok(Self {
             sequence,
             paths,
-            extent,
+            camera,
             developed,
             saturated_shares: photos.iter().map(|photo| photo.saturated_share).collect(),
+            clipped_shares: photos.iter().map(|photo| photo.clipped_share).collect(),
+            piles: photos.iter().map(|photo| photo.pile).collect(),
             brightness: SequenceBrightness {
                 thumbnails: photos.into_iter().map(|photo| photo.thumbnail).collect(),
             },
@@ -342,6 +370,22 @@ impl Session {
         found.map(|(i, _)| i).collect()
     }
 
+    /// Warns of the photograph with most samples too far below black, if they are many.
+    fn warn_of_clipping(&self) {
+        let shares = self.clipped_shares.iter().enumerate();
+        let Some((i, share)) = shares.max_by(|a, b| a.1.total_cmp(b.1)) else {
+            return;
+        };
+        if *share > MAX_CLIPPED {
+            eprintln!(
+                "warning: {:.1} % of the samples of {} are below black by more than 3 % of white, and are clipped; is --black \
+                 right?",
+                100.0 * share,
+                self.path(i)
+            );
+        }
+    }
+
     /// Notes exposures that cost accuracy, and a lamp that drifts.
     fn note_exposure(&self) {
         let thumbnail = |i: &usize| &self.brightness.thumbnails[*i];
@@ -366,6 +410,12 @@ impl Session {
                     "note: the brightest part of {} is at {:.0} % of white; more exposure would lower the noise",
                     self.path(*flood),
                     100.0 * brightest
+                );
+            }
+            if let Some(pile) = self.piles[*flood] {
+                eprintln!(
+                    "warning: many samples of {} are exactly {pile}, as if the camera saturated there: then --white is {pile}",
+                    self.path(*flood)
                 );
             }
             let references = self.photos_of(|role| *role == PictureRole::Reference);

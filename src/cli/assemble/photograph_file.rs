@@ -1,32 +1,99 @@
 //! Photographs as cameras and raw converters write them, turned into 16-bit linear RGB.
 
+use std::fmt;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
-use image::{DynamicImage, ImageReader, Limits};
+use anyhow::{Context, Result, bail, ensure};
 
-use super::photograph_list::is_photograph;
+use super::photograph_list::{is_picture, is_raw};
 use crate::capture::{CameraResponse, ManifestCamera};
+use crate::photo_file::{PhotoSamples, RawConverter, decode_photo};
 use crate::transport::{CHANNELS, Extent, TileRect};
 
 /// Sides of the thumbnail that photographs are paired by.
 const THUMBNAIL_SIDE: usize = 16;
-/// Code of a saturated sample, and of white where a tone curve is undone.
-const WHITE: u16 = u16::MAX;
+/// The code of a saturated sample, and of white where samples become other codes.
+const MAX_CODE: u16 = u16::MAX;
+/// Photographs of 600 megapixels are decoded; larger ones take too much memory.
+const MAX_SAMPLE_BYTES: u64 = 4 << 30;
+/// Code of black of floating-point photographs, so that their noise below black is kept: down to 3 % of white.
+const FLOAT_BLACK: f64 = 2048.0;
+/// Share of the pixels that are equal to the largest in a pile: far more than of a bright part of an object, which has noise.
+const MIN_PILE_PIXELS: f64 = 0.005;
+/// Where a pile begins, as a share of white: a darker one would be of another cause.
+const MIN_PILE_SHARE: f64 = 0.5;
+/// Code from which on raw files are saturated, if none is given. The converter rounds down, and averages two greens of
+/// which one may be saturated, so that white itself would miss some.
+const RAW_WHITE: f64 = 65_000.0;
+
+/// The samples of a photograph's file. Photographs of one capture have the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleKind {
+    /// Integers of 8 bits.
+    EightBit,
+    /// Integers of 16 or 32 bits.
+    Integer,
+    /// Floating-point numbers.
+    Float,
+    /// Those of a raw file, converted to 16 bits from the sensor's black to its white.
+    Raw,
+}
+
+impl SampleKind {
+    /// The sample of white, if none is given.
+    fn default_white(self) -> f64 {
+        match self {
+            Self::EightBit | Self::Integer => f64::from(MAX_CODE),
+            Self::Float => 1.0,
+            Self::Raw => RAW_WHITE,
+        }
+    }
+}
+
+impl fmt::Display for SampleKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::EightBit => "8 bits a sample",
+            Self::Integer => "integers of 16 or 32 bits",
+            Self::Float => "floating-point samples",
+            Self::Raw => "a camera's raw data",
+        })
+    }
+}
 
 /// How photographs become linear.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct DevelopSettings {
     /// Tone curve; `None` if it is not declared.
     pub response: Option<CameraResponse>,
-    /// Code without light, of 16 bits.
-    pub black: f64,
-    /// Code at full scale.
-    pub white: f64,
+    /// Sample without light; `None` if it is not declared.
+    pub black: Option<f64>,
+    /// Sample at full scale; `None` if it is not declared.
+    pub white: Option<f64>,
     /// Side of the squares of pixels that are averaged.
     pub bin: u32,
     /// The part of the picture that is kept, in pixels before averaging.
     pub crop: Option<TileRect>,
+}
+
+/// The numbers of black and white.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Levels {
+    black: f64,
+    white: f64,
+}
+
+impl Levels {
+    /// A number as a share of white.
+    fn share(self, number: f64) -> f64 {
+        (number - self.black) / (self.white - self.black)
+    }
+
+    fn number(self, share: f64) -> f64 {
+        self.black + share * (self.white - self.black)
+    }
 }
 
 impl DevelopSettings {
@@ -34,86 +101,155 @@ impl DevelopSettings {
         self.response.unwrap_or_default()
     }
 
-    fn is_linear(&self) -> bool {
-        self.response() == CameraResponse::Linear
+    /// Levels of the samples in a photograph's file.
+    fn stored(&self, kind: SampleKind) -> Result<Levels> {
+        let black = self.black.unwrap_or(0.0);
+        let white = self.white.unwrap_or(kind.default_white());
+        ensure!(
+            black < white,
+            "has {kind}, whose white is {white}, but --black is {black}; give a --white above it"
+        );
+        if kind == SampleKind::Float {
+            return Ok(Levels { black, white });
+        }
+        ensure!(
+            black >= 0.0 && white <= f64::from(MAX_CODE),
+            "has {kind}, of which --black and --white are codes from 0 to {MAX_CODE}"
+        );
+        if kind == SampleKind::Raw {
+            ensure!(
+                black == 0.0,
+                "is a raw file, whose black level is subtracted already; leave --black out"
+            );
+            ensure!(
+                self.response() == CameraResponse::Linear,
+                "is a raw file, which is linear; leave --response out"
+            );
+        }
+        Ok(Levels { black, white })
     }
 
-    /// The camera of developed photographs of this size.
-    pub fn camera(&self, extent: Extent) -> ManifestCamera {
-        let (black, white) = match self.is_linear() {
-            true => (self.black, self.white),
-            false => (0.0, f64::from(WHITE)),
-        };
-        ManifestCamera {
-            width: extent.width,
-            height: extent.height,
-            black,
-            white,
-            ..ManifestCamera::default()
+    /// Levels of the codes in the capture: those of the file, if its samples can be kept.
+    fn written(&self, kind: SampleKind, stored: Levels) -> Levels {
+        let white = f64::from(MAX_CODE);
+        match (self.response(), kind) {
+            (CameraResponse::Linear, SampleKind::Float) => Levels {
+                black: FLOAT_BLACK,
+                white,
+            },
+            (CameraResponse::Linear, _) => stored,
+            _ => Levels { black: 0.0, white },
         }
     }
 }
 
 /// A photograph in 16 bits, linear.
 pub struct DevelopedPhotograph {
-    pub extent: Extent,
+    /// Size and levels.
+    pub camera: ManifestCamera,
     /// `[N]`.
     pub codes: Vec<[u16; CHANNELS]>,
     /// Mean measurement of each part of the picture.
     pub thumbnail: Vec<f64>,
     /// Share of the samples that are saturated.
     pub saturated_share: f64,
-    /// Whether the file has 8 bits a sample.
-    pub is_eight_bit: bool,
+    /// Share of the samples that are too far below black for a code.
+    pub clipped_share: f64,
+    /// The sample at which many pile up below white, as if they were saturated.
+    pub pile: Option<f64>,
+    /// The samples of the file.
+    pub kind: SampleKind,
 }
 
-/// Reads and develops the photograph at `path`.
-pub fn develop(path: &Path, settings: &DevelopSettings) -> Result<DevelopedPhotograph> {
-    read(path, settings).with_context(|| path.display().to_string())
+/// Reads and develops the photograph at `path`. Temporary files go to the folder `scratch`.
+pub fn develop(
+    path: &Path,
+    settings: &DevelopSettings,
+    scratch: &Path,
+) -> Result<DevelopedPhotograph> {
+    let develop = || {
+        let (samples, kind) = read(path, scratch)?;
+        develop_samples(&samples, kind, settings)
+    };
+    develop().with_context(|| path.display().to_string())
 }
 
-/// Photographs of 600 megapixels are decoded; larger ones take too much memory.
-fn limits() -> Limits {
-    let mut limits = Limits::default();
-    limits.max_alloc = Some(4 << 30);
-    limits
+fn read(path: &Path, scratch: &Path) -> Result<(PhotoSamples, SampleKind)> {
+    if is_raw(path) {
+        let samples = RawConverter::default().convert(path, scratch, MAX_SAMPLE_BYTES)?;
+        return Ok((samples, SampleKind::Raw));
+    }
+    ensure!(
+        is_picture(path),
+        "is neither PNG, TIFF, OpenEXR nor a raw file by its name; convert it to 16-bit linear TIFF first (docs/capture.md says how)"
+    );
+    let file = File::open(path).context("cannot be read")?;
+    let samples = decode_photo(BufReader::new(file), MAX_SAMPLE_BYTES)?;
+    let kind = match (samples.is_float(), samples.is_eight_bit()) {
+        (true, _) => SampleKind::Float,
+        (_, true) => SampleKind::EightBit,
+        _ => SampleKind::Integer,
+    };
+    Ok((samples, kind))
 }
 
-fn read(path: &Path, settings: &DevelopSettings) -> Result<DevelopedPhotograph> {
-    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
-    reader.limits(limits());
+fn develop_samples(
+    samples: &PhotoSamples,
+    kind: SampleKind,
+    settings: &DevelopSettings,
+) -> Result<DevelopedPhotograph> {
     ensure!(
-        is_photograph(path),
-        "is no PNG or TIFF; convert raw files to 16-bit linear TIFF first (docs/capture.md says how)"
-    );
-    let image = reader.decode().context("cannot be decoded")?;
-    ensure!(
-        !matches!(
-            image,
-            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
-        ),
-        "has floating-point samples; export integers of 16 bits"
-    );
-    let is_eight_bit = matches!(
-        image,
-        DynamicImage::ImageLuma8(_)
-            | DynamicImage::ImageLumaA8(_)
-            | DynamicImage::ImageRgb8(_)
-            | DynamicImage::ImageRgba8(_)
-    );
-    ensure!(
-        !is_eight_bit || settings.response.is_some(),
+        kind != SampleKind::EightBit || settings.response.is_some(),
         "has 8 bits a sample, mostly with a tone curve. Give --response srgb, or --response linear if it has none; 16-bit \
-         linear photographs from raw files are far better"
+         linear photographs or raw files are far better"
     );
-    let picture = image.into_rgb16();
-    let (width, height) = picture.dimensions();
+    let stored = settings.stored(kind)?;
+    let rect = kept_part(samples.extent(), settings)?;
+    let development = Development {
+        stored,
+        written: settings.written(kind, stored),
+        response: settings.response(),
+        bin: settings.bin,
+    };
+    let sample = |x: u32, y: u32| samples.pixel(rect.x + x, rect.y + y);
+    let averaged = match development.average(rect.extent, sample) {
+        Ok(averaged) => averaged,
+        Err(NotANumber { x, y }) => bail!(
+            "has a sample at ({}, {}) that is not a number, or minus infinity; export it again, or write 0 for pixels that the \
+             converter cannot compute",
+            rect.x + x,
+            rect.y + y
+        ),
+    };
+    let count = (averaged.codes.len() * CHANNELS) as f64;
+    let pile = averaged.pile(stored);
+    Ok(DevelopedPhotograph {
+        camera: ManifestCamera {
+            width: averaged.extent.width,
+            height: averaged.extent.height,
+            black: development.written.black,
+            white: development.written.white,
+            ..ManifestCamera::default()
+        },
+        thumbnail: averaged.thumbnail,
+        saturated_share: averaged.saturated as f64 / count,
+        clipped_share: averaged.clipped as f64 / count,
+        // With 8 bits, many samples have the same code anyway.
+        pile: pile.filter(|_| kind != SampleKind::EightBit),
+        codes: averaged.codes,
+        kind,
+    })
+}
+
+/// The part of a picture that is kept: whole squares of pixels.
+fn kept_part(picture: Extent, settings: &DevelopSettings) -> Result<TileRect> {
+    let Extent { width, height } = picture;
     let whole = TileRect {
         x: 0,
         y: 0,
-        extent: Extent::new(width, height),
+        extent: picture,
     };
-    let rect = settings.crop.unwrap_or(whole);
+    let mut rect = settings.crop.unwrap_or(whole);
     let Extent {
         width: crop_width,
         height: crop_height,
@@ -125,70 +261,127 @@ fn read(path: &Path, settings: &DevelopSettings) -> Result<DevelopedPhotograph> 
         rect.x,
         rect.y
     );
-    let extent = Extent::new(crop_width / settings.bin, crop_height / settings.bin);
+    let bin = settings.bin;
     ensure!(
-        extent.width > 0 && extent.height > 0,
-        "has fewer pixels than --bin {} averages",
-        settings.bin
+        crop_width >= bin && crop_height >= bin,
+        "has fewer pixels than --bin {bin} averages"
     );
-    let code = |x: u32, y: u32| picture.get_pixel(rect.x + x, rect.y + y).0;
-    Ok(DevelopedPhotograph {
-        is_eight_bit,
-        ..averaged(extent, settings, code)
-    })
+    rect.extent = Extent::new(crop_width / bin * bin, crop_height / bin * bin);
+    Ok(rect)
 }
 
-/// Linearises codes and averages squares of them; `code` is that of a pixel before averaging.
-fn averaged(
-    extent: Extent,
-    settings: &DevelopSettings,
-    code: impl Fn(u32, u32) -> [u16; CHANNELS],
-) -> DevelopedPhotograph {
-    let (range, bin) = (settings.white - settings.black, settings.bin);
-    let share = |code: u16| (f64::from(code) - settings.black) / range;
-    let linear = |code: u16| match settings.is_linear() {
-        true => f64::from(code),
-        false => f64::from(WHITE) * settings.response().linearise(share(code)),
-    };
-    let measurement = |code: f64| match settings.is_linear() {
-        true => (code - settings.black) / range,
-        false => code / f64::from(WHITE),
-    };
-    let mut codes = Vec::with_capacity(extent.area());
-    let mut sums = vec![[0.0; 2]; THUMBNAIL_SIDE * THUMBNAIL_SIDE];
-    let mut saturated = 0;
-    for (x, y) in extent.cells() {
-        let mut total = [0.0; CHANNELS];
-        let mut is_saturated = [false; CHANNELS];
-        for (dx, dy) in Extent::new(bin, bin).cells() {
-            let code = code(x * bin + dx, y * bin + dy);
-            for c in 0..CHANNELS {
-                total[c] += linear(code[c]);
-                is_saturated[c] |= f64::from(code[c]) >= settings.white;
-            }
+/// The largest sample of a channel, and how many samples are equal to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct LargestSample {
+    sample: f64,
+    count: usize,
+}
+
+impl LargestSample {
+    fn add(&mut self, sample: f64) {
+        if sample > self.sample {
+            *self = Self { sample, count: 0 };
         }
-        let place = |at: u32, side: u32| at as usize * THUMBNAIL_SIDE / side as usize;
-        let part = place(y, extent.height) * THUMBNAIL_SIDE + place(x, extent.width);
-        codes.push(std::array::from_fn(|c| {
-            let mean = total[c] / f64::from(bin * bin);
-            sums[part][0] += measurement(mean);
-            sums[part][1] += 1.0;
-            match is_saturated[c] {
-                true => {
-                    saturated += 1;
-                    WHITE
-                }
-                false => mean.round() as u16,
-            }
-        }));
+        self.count += usize::from(sample == self.sample);
     }
-    let parts = sums.iter().filter(|[_, count]| *count > 0.0);
-    DevelopedPhotograph {
-        extent,
-        thumbnail: parts.map(|[sum, count]| sum / count).collect(),
-        saturated_share: f64::from(saturated) / (codes.len() * CHANNELS) as f64,
-        is_eight_bit: false,
-        codes,
+}
+
+/// How samples become codes.
+struct Development {
+    stored: Levels,
+    written: Levels,
+    response: CameraResponse,
+    bin: u32,
+}
+
+/// A pixel has a sample that is not a number, or minus infinity.
+#[derive(Debug, PartialEq)]
+struct NotANumber {
+    x: u32,
+    y: u32,
+}
+
+/// Linear codes, averaged.
+#[derive(Debug, PartialEq)]
+struct AveragedPhotograph {
+    extent: Extent,
+    codes: Vec<[u16; CHANNELS]>,
+    thumbnail: Vec<f64>,
+    saturated: usize,
+    clipped: usize,
+    /// Number of pixels before averaging.
+    pixels: usize,
+    largest: [LargestSample; CHANNELS],
+}
+
+impl AveragedPhotograph {
+    /// The least sample at which a channel ends with many equal samples, below white, but not far below.
+    fn pile(&self, stored: Levels) -> Option<f64> {
+        let least = stored.number(MIN_PILE_SHARE);
+        let is_pile = |largest: &&LargestSample| {
+            (least..stored.white).contains(&largest.sample)
+                && largest.count as f64 > MIN_PILE_PIXELS * self.pixels as f64
+        };
+        let piles = self.largest.iter().filter(is_pile);
+        piles.map(|largest| largest.sample).min_by(f64::total_cmp)
+    }
+}
+
+impl Development {
+    /// Linearises samples and averages squares of them; `sample` is that of a pixel before averaging. Samples at white or
+    /// above, infinity included, are saturated, and so is every square that has one.
+    fn average(
+        &self,
+        picture: Extent,
+        sample: impl Fn(u32, u32) -> [f64; CHANNELS],
+    ) -> Result<AveragedPhotograph, NotANumber> {
+        let bin = self.bin;
+        let extent = Extent::new(picture.width / bin, picture.height / bin);
+        let mut codes = Vec::with_capacity(extent.area());
+        let mut sums = vec![[0.0; 2]; THUMBNAIL_SIDE * THUMBNAIL_SIDE];
+        let (mut saturated, mut clipped) = (0, 0);
+        let mut largest = [LargestSample::default(); CHANNELS];
+        for (x, y) in extent.cells() {
+            let mut total = [0.0; CHANNELS];
+            let mut is_saturated = [false; CHANNELS];
+            for (dx, dy) in Extent::new(bin, bin).cells() {
+                let (x, y) = (x * bin + dx, y * bin + dy);
+                let sample = sample(x, y);
+                for c in 0..CHANNELS {
+                    if sample[c].is_nan() || sample[c] == f64::NEG_INFINITY {
+                        return Err(NotANumber { x, y });
+                    }
+                    largest[c].add(sample[c]);
+                    is_saturated[c] |= sample[c] >= self.stored.white;
+                    let share = self.stored.share(sample[c].min(self.stored.white));
+                    total[c] += self.response.linearise(share);
+                }
+            }
+            let place = |at: u32, side: u32| at as usize * THUMBNAIL_SIDE / side as usize;
+            let part = place(y, extent.height) * THUMBNAIL_SIDE + place(x, extent.width);
+            codes.push(std::array::from_fn(|c| {
+                let measurement = total[c] / f64::from(bin * bin);
+                sums[part][0] += measurement;
+                sums[part][1] += 1.0;
+                if is_saturated[c] {
+                    saturated += 1;
+                    return MAX_CODE;
+                }
+                let code = self.written.number(measurement).round();
+                clipped += usize::from(code < 0.0);
+                code as u16
+            }));
+        }
+        let parts = sums.iter().filter(|[_, count]| *count > 0.0);
+        Ok(AveragedPhotograph {
+            extent,
+            thumbnail: parts.map(|[sum, count]| sum / count).collect(),
+            codes,
+            saturated,
+            clipped,
+            pixels: picture.area(),
+            largest,
+        })
     }
 }
 
@@ -198,26 +391,33 @@ mod tests {
 
     const SETTINGS: DevelopSettings = DevelopSettings {
         response: None,
-        black: 500.0,
-        white: 60_000.0,
+        black: Some(500.0),
+        white: Some(60_000.0),
         bin: 2,
         crop: None,
     };
 
+    fn development(settings: &DevelopSettings, kind: SampleKind) -> Development {
+        let stored = settings.stored(kind).unwrap();
+        Development {
+            stored,
+            written: settings.written(kind, stored),
+            response: settings.response(),
+            bin: settings.bin,
+        }
+    }
+
     #[test]
     fn squares_of_pixels_are_averaged_and_saturation_is_kept() {
-        let code = |x: u32, y: u32| match (x, y) {
-            (3, 1) => [60_000, 1000, 1000],
-            (x, _) => [1000 + 100 * x as u16; CHANNELS],
+        let sample = |x: u32, y: u32| match (x, y) {
+            (3, 1) => [60_000.0, 1000.0, 1000.0],
+            (x, _) => [1000.0 + 100.0 * f64::from(x); CHANNELS],
         };
-        let photo = averaged(Extent::new(2, 1), &SETTINGS, code);
-        assert_eq!(photo.codes, [[1050; 3], [WHITE, 1175, 1175]]);
-        assert!((photo.saturated_share - 1.0 / 6.0).abs() < 1e-12);
-        let camera = SETTINGS.camera(photo.extent);
-        assert_eq!(
-            (camera.width, camera.black, camera.white),
-            (2, 500.0, 60_000.0)
-        );
+        let development = development(&SETTINGS, SampleKind::Integer);
+        let photo = development.average(Extent::new(4, 2), sample).unwrap();
+        assert_eq!(photo.codes, [[1050; 3], [MAX_CODE, 1175, 1175]]);
+        assert_eq!((photo.saturated, photo.clipped), (1, 0));
+        assert_eq!(development.written, development.stored);
         let expected = 550.0 / 59_500.0;
         assert!((photo.thumbnail[0] - expected).abs() < 1e-12);
     }
@@ -226,13 +426,91 @@ mod tests {
     fn a_tone_curve_is_undone_before_averaging() {
         let settings = DevelopSettings {
             response: Some(CameraResponse::Gamma(2.0)),
-            black: 0.0,
-            white: 65_535.0,
+            black: None,
+            white: None,
             ..SETTINGS
         };
-        let code = |x: u32, _: u32| if x == 0 { [0; 3] } else { [32_768; 3] };
-        let photo = averaged(Extent::new(1, 1), &settings, code);
+        let sample = |x: u32, _: u32| if x == 0 { [0.0; 3] } else { [32_768.0; 3] };
+        let photo = development(&settings, SampleKind::EightBit);
+        let photo = photo.average(Extent::new(2, 2), sample).unwrap();
         // Half of a quarter of white.
         assert!(photo.codes[0][0].abs_diff(8192) <= 1, "{:?}", photo.codes);
+    }
+
+    #[test]
+    fn floating_point_noise_below_black_is_kept() {
+        let settings = DevelopSettings {
+            black: None,
+            white: Some(4.0),
+            bin: 1,
+            ..SETTINGS
+        };
+        let development = development(&settings, SampleKind::Float);
+        let values = [-0.05, 0.0, 1.0, f64::INFINITY, -1.0];
+        let sample = |x: u32, _: u32| [values[x as usize]; CHANNELS];
+        let photo = development.average(Extent::new(5, 1), sample).unwrap();
+        let codes: Vec<u16> = photo.codes.iter().map(|code| code[0]).collect();
+        // White is 63487 codes above black.
+        assert_eq!(codes, [1254, 2048, 17_920, MAX_CODE, 0]);
+        assert_eq!((photo.saturated, photo.clipped), (3, 3));
+        assert!(photo.thumbnail.iter().all(|mean| mean.is_finite()));
+        for invalid in [f64::NAN, f64::NEG_INFINITY] {
+            let sample = |x: u32, _: u32| [0.0, 0.0, if x == 3 { invalid } else { 0.0 }];
+            let refused = development.average(Extent::new(5, 1), sample);
+            assert_eq!(refused, Err(NotANumber { x: 3, y: 0 }));
+        }
+    }
+
+    #[test]
+    fn samples_that_pile_up_below_white_are_found() {
+        let settings = DevelopSettings { bin: 1, ..SETTINGS };
+        let development = development(&settings, SampleKind::Integer);
+        let extent = Extent::new(100, 1);
+        let pile = |largest: f64| {
+            let sample = |x: u32, _: u32| [100.0, (1000.0 * f64::from(x)).min(largest), 60_000.0];
+            let photo = development.average(extent, sample).unwrap();
+            photo.pile(development.stored)
+        };
+        assert_eq!(pile(50_000.0), Some(50_000.0));
+        assert_eq!(pile(20_000.0), None);
+        assert_eq!(pile(60_000.0), None);
+    }
+
+    #[test]
+    fn levels_that_do_not_fit_the_samples_are_refused() {
+        let error = |black, white, response, kind| {
+            let settings = DevelopSettings {
+                black,
+                white,
+                response,
+                ..SETTINGS
+            };
+            settings.stored(kind).unwrap_err().to_string()
+        };
+        let curve = Some(CameraResponse::Srgb);
+        for (message, part) in [
+            (
+                error(Some(2.0), None, None, SampleKind::Float),
+                "--white above",
+            ),
+            (
+                error(None, Some(7e4), None, SampleKind::Integer),
+                "0 to 65535",
+            ),
+            (
+                error(Some(-1.0), None, None, SampleKind::Integer),
+                "0 to 65535",
+            ),
+            (
+                error(Some(9.0), None, None, SampleKind::Raw),
+                "leave --black out",
+            ),
+            (
+                error(None, None, curve, SampleKind::Raw),
+                "leave --response out",
+            ),
+        ] {
+            assert!(message.contains(part), "{message}");
+        }
     }
 }

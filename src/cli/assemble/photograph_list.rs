@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-/// Extensions of files that are photographs.
-const EXTENSIONS: [&str; 3] = ["png", "tif", "tiff"];
+use crate::photo_file::RAW_EXTENSIONS;
 
-/// The files of `paths`; of a folder its PNG and TIFF files, sorted by their names with numbers by their values.
+/// Extensions of pictures that are read as they are.
+const PICTURE_EXTENSIONS: [&str; 4] = ["png", "tif", "tiff", "exr"];
+
+/// The files of `paths`; of a folder its photographs, sorted by their names with numbers by their values.
 pub fn photographs(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in paths {
@@ -25,8 +27,18 @@ pub fn photographs(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Whether a file has the extension of a type that can be read. Hidden files are others: macOS keeps notes in `._IMG_1.tif`.
-pub fn is_photograph(path: &Path) -> bool {
+/// Whether a file is a PNG, TIFF or OpenEXR picture by its name.
+pub fn is_picture(path: &Path) -> bool {
+    has_extension(path, &PICTURE_EXTENSIONS)
+}
+
+/// Whether a file is a camera's raw file by its name.
+pub fn is_raw(path: &Path) -> bool {
+    has_extension(path, &RAW_EXTENSIONS)
+}
+
+/// Hidden files are others: macOS keeps notes in `._IMG_1.tif`.
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     let is_hidden = |name: &OsStr| name.to_string_lossy().starts_with('.');
     if path.file_name().is_some_and(is_hidden) {
         return false;
@@ -34,20 +46,25 @@ pub fn is_photograph(path: &Path) -> bool {
     let extension = path
         .extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase());
-    extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str()))
+    extension.is_some_and(|e| extensions.contains(&e.as_str()))
 }
 
 fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(path)? {
         let file = entry?.path();
-        if is_photograph(&file) && file.is_file() {
+        if (is_picture(&file) || is_raw(&file)) && file.is_file() {
             files.push(file);
         }
     }
     ensure!(
         !files.is_empty(),
-        "has no PNG or TIFF files; convert raw files to 16-bit linear TIFF first (docs/capture.md says how)"
+        "has no raw, PNG, TIFF or OpenEXR files; photographs are 16-bit linear (docs/shooting.md says how)"
+    );
+    // A camera that saves both writes JPEG beside raw, but converted photographs may lie beside them.
+    ensure!(
+        files.iter().all(|file| is_raw(file)) || files.iter().all(|file| is_picture(file)),
+        "has raw files beside PNG, TIFF or OpenEXR files; move one kind out, or name the files of the other after --photos"
     );
     let name = |file: &PathBuf| {
         file.file_name()
@@ -98,6 +115,15 @@ mod tests {
         assert_eq!(names.collect::<Vec<_>>(), expected);
         let empty = tempfile::TempDir::new().unwrap();
         assert!(photographs(&[empty.path().to_owned()]).is_err());
+        let raw = folder.path().join("IMG_9.CR2");
+        std::fs::write(&raw, "").unwrap();
+        let error = photographs(&[folder.path().to_owned()]).unwrap_err();
+        assert!(
+            format!("{error:#}").contains("has raw files beside"),
+            "{error:#}"
+        );
+        let raw = [raw];
+        assert_eq!(photographs(&raw).unwrap(), raw);
         // Single files keep their order.
         let given = ["IMG_10.tif", "IMG_9.TIF"].map(|name| folder.path().join(name));
         assert_eq!(photographs(&given).unwrap(), given);
