@@ -1,11 +1,13 @@
-//! Writes the seeds of the targets that take files: one small file in each coding.
+//! Writes the seeds of the targets that take files: one small file in each coding, and one small photograph in each format.
 //!
 //! Run `cargo run --manifest-path fuzz/Cargo.toml --example seeds` after a change of the format.
 
+use std::io::Cursor;
 use std::path::Path;
 
 use fuzzing::choices::Choices;
 use fuzzing::source::ArbitraryInput;
+use image::{DynamicImage, ImageFormat};
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::format::{Metadata, EncodingTarget};
 use relightable_photo::transport::{
@@ -81,5 +83,32 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             std::fs::write(folder.join(name), seed)?;
         }
     }
+    write_photographs(&seeds.join("photo_file"))
+}
+
+/// Photographs of 5 x 4 pixels.
+fn write_photographs(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    const SIZE: (u32, u32) = (5, 4);
+    std::fs::create_dir_all(folder)?;
+    let code = |x: u32, y: u32| (9000 * x + 700 * y) as u16;
+    let rgb = image::ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| {
+        image::Rgb([code(x, y), code(y, x), code(x, x)])
+    });
+    let sixteen = DynamicImage::ImageRgb16(rgb);
+    let eight = DynamicImage::ImageLumaA8(sixteen.to_luma_alpha8());
+    let float = DynamicImage::ImageRgb32F(sixteen.to_rgb32f());
+    for (name, image, format) in [
+        ("png-rgb-16", &sixteen, ImageFormat::Png),
+        ("png-grey-alpha-8", &eight, ImageFormat::Png),
+        ("tiff-rgb-16", &sixteen, ImageFormat::Tiff),
+        ("tiff-rgb-float", &float, ImageFormat::Tiff),
+    ] {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format)?;
+        std::fs::write(folder.join(name), bytes.into_inner())?;
+    }
+    let [width, height] = [SIZE.0 as usize, SIZE.1 as usize];
+    let pixel = |x: usize, y: usize| (x as f32 / 4.0, y as f32 / 3.0, -0.01f32);
+    exr::prelude::write_rgb_file(folder.join("exr-rgb-float"), width, height, pixel)?;
     Ok(())
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::display_layout::{DisplayLayout, DisplayLayoutError};
+use crate::calibrate::LightPlaneAxis;
 use crate::capture::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
 use crate::simulate::{
     GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, RandomStreamId,
@@ -97,6 +98,20 @@ pub enum SequenceError {
     /// A side of the display or the light plane is zero or too large.
     #[error("\"layout\" has a side that is not between 1 and {MAX_SIDE}")]
     Side,
+    /// A bit of the Gray code is none of the light plane's.
+    #[error(
+        "pictures[{index}]: \"bit\" is {bit}, but {light} light elements have no such bit of axis {axis}"
+    )]
+    GrayCodeBit {
+        /// Index of the picture.
+        index: usize,
+        /// The bit.
+        bit: u32,
+        /// Its axis.
+        axis: LightPlaneAxis,
+        /// Size of the light plane in elements.
+        light: Extent,
+    },
     /// A path leads out of the folder that it must be in, or is there twice.
     #[error("pictures[{index}]: {path:?} must be the only PNG of this name in {folder}/")]
     Path {
@@ -192,6 +207,7 @@ impl PatternSequence {
             return Err(SequenceError::NoPatterns);
         }
         sequence.check_layout()?;
+        sequence.check_gray_code()?;
         sequence.check_paths()?;
         Ok(sequence)
     }
@@ -207,6 +223,27 @@ impl PatternSequence {
             return Err(SequenceError::Side);
         }
         DisplayLayout::new(display, light, Some(element_side))?;
+        Ok(())
+    }
+
+    /// The manifest has no other bits either.
+    fn check_gray_code(&self) -> Result<(), SequenceError> {
+        let light = self.layout.light;
+        let bits = GrayCodePattern::all(light);
+        for (index, picture) in self.pictures.iter().enumerate() {
+            match picture.role {
+                PictureRole::GrayCode(pattern) if !bits.contains(&pattern) => {
+                    let GrayCodePattern { axis, bit, .. } = pattern;
+                    return Err(SequenceError::GrayCodeBit {
+                        index,
+                        bit,
+                        axis,
+                        light,
+                    });
+                }
+                _ => {}
+            }
+        }
         Ok(())
     }
 
@@ -339,6 +376,10 @@ mod tests {
             (
                 &json.replace("\"pattern\"", "\"flood\""),
                 "no random patterns",
+            ),
+            (
+                &json.replacen("\"bit\":3", "\"bit\":4", 1),
+                "\"bit\" is 4, but 12x8 light elements",
             ),
         ] {
             let error = PatternSequence::parse(json).unwrap_err().to_string();

@@ -287,8 +287,8 @@ impl Manifest {
         let (black, white) = (camera.black, camera.white);
         let valid = (0.0..MAX_CODE).contains(&black);
         check_range(valid, "camera.black", black, "a 16-bit code")?;
-        let allowed = format!("a 16-bit code above \"camera.black\", {black}");
-        let valid = white > black && white <= MAX_CODE;
+        let allowed = format!("a 16-bit code above \"camera.black\", {black}, by at least 1");
+        let valid = white - black >= 1.0 && white <= MAX_CODE;
         check_range(valid, "camera.white", white, &allowed)?;
         for (c, saturation) in camera.saturation.iter().flatten().enumerate() {
             let valid = *saturation > black && *saturation <= white;
