@@ -274,7 +274,7 @@ fn rates(files: &Files, figures: &mut Figures) {
         (values * CHANNELS * size_of::<f32>()) as f64 / 1e6
     };
     let source = EncoderInput {
-        geometry: given.index.header.geometry,
+        geometry: given.index.header.geometry.clone(),
         basis: Some(&given.basis),
         tile: &|i| Ok(given.tiles[i].clone()),
         metadata: Metadata::default(),

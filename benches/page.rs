@@ -60,7 +60,7 @@ fn write_file(path: &Path, side: u32, rank: usize) {
     let geometry = synthetic_photo::geometry(side);
     let basis = synthetic_photo::basis(&geometry, rank);
     let source = EncoderInput {
-        geometry,
+        geometry: geometry.clone(),
         basis: Some(&basis),
         tile: &|i| Ok(synthetic_photo::tile(&geometry, rank, i)),
         metadata: Metadata::default(),

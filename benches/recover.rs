@@ -81,7 +81,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TileTransportFunctions>) {
         electrons: 40_000.0,
     };
     let emissions = EmissionMatrix::new(light, &codes);
-    let geometry = *scene.geometry();
+    let geometry = scene.geometry().clone();
     let truth: Vec<_> = (0..geometry.tile_grid().area())
         .into_par_iter()
         .map(|i| scene.tile(geometry.tile(i)))

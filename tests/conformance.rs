@@ -19,17 +19,18 @@ use relightable_photo::format::{
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::{
-    Basis, CHANNELS, CameraPixel, Decibels, FloatTile, Geometry, Tile, TileRect,
+    Basis, CHANNELS, CameraPixel, Decibels, DisplacementGrid, FloatTile, Geometry, Tile, TileRect,
 };
 
 /// The files, as appendix G of `docs/format.md` lists them.
-const NAMES: [&str; 7] = [
+const NAMES: [&str; 8] = [
     "transform",
     "coarse",
     "direct",
     "mixed",
     "lossless",
     "extended",
+    "bent",
     "dark",
 ];
 
@@ -84,7 +85,7 @@ impl Synthetic {
 
     /// Adds direct functions to some tiles, with a peak in the centre of the window.
     fn and_direct(mut self, tiles: &[usize]) -> Self {
-        let functions = functions(self.geometry, 3);
+        let functions = functions(self.geometry.clone(), 3);
         let (side, area) = (
             self.geometry.window.side() as usize,
             self.geometry.window.area(),
@@ -121,7 +122,7 @@ impl Synthetic {
         extensions: Vec<FormatExtension>,
     ) -> Vec<u8> {
         let source = EncoderInput {
-            geometry: self.geometry,
+            geometry: self.geometry.clone(),
             basis: self.basis.as_ref(),
             tile: &|i| Ok(self.tiles[i].clone()),
             metadata,
@@ -206,10 +207,31 @@ fn make(name: &str) -> Vec<u8> {
             EncodingTarget::Lossless,
         ),
         "extended" => return extended(&Synthetic::factored(small, 2, &[0, 2, 3, 4])),
+        "bent" => (Synthetic::factored(bent(), 2, &[0, 1, 3, 4]), snr(30.0)),
         "dark" => (Synthetic::factored(small, 2, &[]), snr(30.0)),
         _ => unreachable!("{name}"),
     };
     synthetic.encode(target, metadata(), Vec::new())
+}
+
+/// A correspondence that bends along both axes, by up to eight elements, and beyond the light plane.
+fn bent() -> Geometry {
+    let mut geometry = tiled(
+        [41, 27],
+        [21, 14],
+        5,
+        16,
+        [[0.5, 0.01, 0.0], [-0.02, 0.5, 0.0]],
+    );
+    let points = DisplacementGrid::points_over(geometry.camera, 9);
+    let code = |(i, j): (u32, u32)| {
+        let (i, j) = (i as i16, j as i16);
+        [40 * i * i - 97 * j, 300 - 150 * (i - 2) * (i - 2) * j]
+    };
+    let codes = points.cells().map(code).collect();
+    let grid = DisplacementGrid::new(9, 0.011, points, codes).unwrap();
+    geometry.correspondence.displacement = Some(grid.into());
+    geometry.validate().unwrap()
 }
 
 /// A file with everything that a reader of version 1.0 ignores, and text beyond ASCII.
@@ -263,7 +285,7 @@ fn chunks(file: &[u8]) -> (FileIndex, impl Fn(ChunkId) -> Result<Vec<u8>, Format
 /// The decoded values of a file: coefficients and direct functions of each tile, then the basis.
 fn decoded(file: &[u8]) -> Vec<u8> {
     let (index, fetch) = chunks(file);
-    let geometry = index.header.geometry;
+    let geometry = index.header.geometry.clone();
     let mut values: Vec<f32> = Vec::new();
     for (i, rect) in geometry.tiles().enumerate() {
         let tile = format::decode_tile(&index, i, &fetch).unwrap();
@@ -279,10 +301,17 @@ fn decoded(file: &[u8]) -> Vec<u8> {
     }
     let basis = format::decode_basis(&index, &fetch).unwrap();
     values.extend(basis.kernels.iter().flatten());
-    values
+    let mut bytes: Vec<u8> = values
         .iter()
         .flat_map(|value| value.to_le_bytes())
-        .collect()
+        .collect();
+    if geometry.correspondence.displacement.is_some() {
+        for (x, y) in geometry.camera.cells() {
+            let origin = geometry.window_origin(CameraPixel { x, y });
+            bytes.extend([origin.u, origin.v].map(i32::to_le_bytes).as_flattened());
+        }
+    }
+    bytes
 }
 
 /// A hexadecimal dump as in `docs/format.md`.
@@ -348,7 +377,7 @@ fn the_specification_shows_the_smallest_file() {
 fn the_specification_shows_windows_light_transport_functions_and_a_picture() {
     let file = fixture("mixed", "ltm");
     let (index, fetch) = chunks(&file);
-    let geometry = index.header.geometry;
+    let geometry = index.header.geometry.clone();
     let (window, plane) = (geometry.window, geometry.light);
 
     let pixels = [(0, 0), (5, 1), (5, 8), (12, 3), (19, 9)];

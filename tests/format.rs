@@ -35,7 +35,9 @@ impl std::fmt::Debug for Recovered {
 impl Recovered {
     /// Direct tiles; the first is dark.
     fn direct(geometry: Geometry, seed: u64) -> Self {
-        let tiles = functions(geometry, seed).into_iter().map(FloatTile::from);
+        let tiles = functions(geometry.clone(), seed)
+            .into_iter()
+            .map(FloatTile::from);
         Self {
             geometry,
             basis: None,
@@ -46,7 +48,7 @@ impl Recovered {
     /// Direct tiles, with every other tile factored over basis functions of unit norm. The last component is zero, and so
     /// is one factored tile.
     fn mixed(geometry: Geometry, rank: usize, seed: u64) -> Self {
-        let mut recovered = Self::direct(geometry, seed);
+        let mut recovered = Self::direct(geometry.clone(), seed);
         let mut noise = Noise(seed);
         let kernel = |_| {
             let elements = (0..geometry.window.area()).map(|_| noise.next() as f32 - 0.4);
@@ -86,7 +88,7 @@ impl Recovered {
         extensions: Vec<FormatExtension>,
     ) -> Result<EncodedFile, FormatError> {
         let source = EncoderInput {
-            geometry: self.geometry,
+            geometry: self.geometry.clone(),
             basis: self.basis.as_ref(),
             tile: &|i| Ok(self.tiles[i].clone()),
             metadata: metadata(),
@@ -208,7 +210,7 @@ proptest! {
     fn lossless_files_keep_eleven_bits(recovered in any_recovered(), piece in 1usize..5000) {
         let (decoded, meta) = decode(&recovered.file(EncodingTarget::Lossless), piece).unwrap();
         prop_assert_eq!(meta, metadata());
-        prop_assert_eq!(decoded.geometry, recovered.geometry);
+        prop_assert_eq!(&decoded.geometry, &recovered.geometry);
         let snr = recovered.error(&decoded).snr();
         prop_assert!(snr.is_none_or(|snr| snr.0 > 55.0), "{:?}", snr);
     }
@@ -291,10 +293,13 @@ fn every_scan_raises_the_snr_as_declared() {
     let geometry = geometry([70, 50], [40, 30], 7, [[0.5, 0.0, 2.0], [0.0, 0.5, 2.0]]);
     for (recovered, quality) in [
         (
-            Recovered::mixed(geometry, 12, 3),
+            Recovered::mixed(geometry.clone(), 12, 3),
             EncodingTarget::Snr(Decibels(35.0)),
         ),
-        (Recovered::mixed(geometry, 12, 3), EncodingTarget::Lossless),
+        (
+            Recovered::mixed(geometry.clone(), 12, 3),
+            EncodingTarget::Lossless,
+        ),
         (
             Recovered::direct(geometry, 3),
             EncodingTarget::Snr(Decibels(35.0)),
@@ -418,7 +423,7 @@ fn a_metric_may_have_tiles_of_another_kind_than_the_file() {
             ..mixed.clone()
         };
         let metric = KnownTransportMetric {
-            geometry: mixed.geometry,
+            geometry: mixed.geometry.clone(),
             basis,
             tiles: metric_tiles.clone(),
         };
@@ -551,7 +556,7 @@ fn tiles_have_no_seams() {
     };
     let mut noise = Noise(4);
     let mut recovered = Recovered {
-        geometry,
+        geometry: geometry.clone(),
         basis: Some(Basis {
             kernels: (0..6).map(kernel).collect(),
         }),
@@ -1002,7 +1007,7 @@ fn a_preview_stays_within_the_memory_limit() {
     let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
     let geometry = common::tiled([128, 128], [64, 64], 5, 32, affine);
     for recovered in [
-        Recovered::mixed(geometry, 8, 5),
+        Recovered::mixed(geometry.clone(), 8, 5),
         Recovered::direct(geometry, 5),
     ] {
         let file = recovered.file(QUALITY);
@@ -1025,7 +1030,7 @@ fn a_file_is_read_with_the_memory_that_its_index_asks_for() {
     let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
     let geometry = common::tiled([64, 64], [32, 32], 5, 32, affine);
     for recovered in [
-        Recovered::mixed(geometry, 8, 5),
+        Recovered::mixed(geometry.clone(), 8, 5),
         Recovered::direct(geometry, 5),
     ] {
         for target in [QUALITY, EncodingTarget::Lossless] {
@@ -1044,15 +1049,15 @@ fn scans_keep_their_shares_of_the_file() {
     let geometry = common::tiled([128, 128], [64, 64], 5, 64, affine);
     for (recovered, target) in [
         (
-            Recovered::mixed(geometry, 8, 5),
+            Recovered::mixed(geometry.clone(), 8, 5),
             EncodingTarget::Snr(Decibels(35.0)),
         ),
         (
-            Recovered::mixed(geometry, 2, 5),
+            Recovered::mixed(geometry.clone(), 2, 5),
             EncodingTarget::Snr(Decibels(45.0)),
         ),
         (
-            Recovered::direct(geometry, 5),
+            Recovered::direct(geometry.clone(), 5),
             EncodingTarget::Snr(Decibels(35.0)),
         ),
         (Recovered::direct(geometry, 5), EncodingTarget::Lossless),

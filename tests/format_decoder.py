@@ -26,6 +26,8 @@ MAX_EXTENSION_BYTES = 1 << 24
 MAX_METADATA_BYTES = 1 << 20
 MAX_CONTENT_BYTES = MAX_WINDOW_BYTES = 1 << 23
 MAX_EXPONENT = 30
+SPACINGS = 8, 4096
+MAX_CONTROL_POINTS = 1 << 20
 
 
 class Refused(Exception):
@@ -85,7 +87,7 @@ class FileIndex:
             at += length
         self.index_bytes = at
         self.read_directory(sections[0])
-        read_extensions(sections[1])
+        self.displacement = read_extensions(sections[1], self.width, self.height)
         read_metadata(sections[2])
         self.take_chunks(file)
 
@@ -173,14 +175,33 @@ def is_valid_entry(coding, count, tile, length, content):  # appendix A
     return low <= content <= min(high, MAX_CONTENT_BYTES) and length <= max_bytes
 
 
-def read_extensions(data):  # section 3.3
-    at = 0
+def read_extensions(data, width, height):  # section 3.3
+    """The displacement of the correspondence, if there is one."""
+    at, displacement = 0, None
     while at < len(data):
         require(at + 12 <= len(data), "an extension that is cut short")
         tag, flags, length = unpack_from("<4sII", data, at)
-        require(not flags & 1, f"an extension that must be understood: {tag}")
+        require(tag == b"DISP" or not flags & 1, f"an extension that must be understood: {tag}")
         at += 12 + length
         require(at <= len(data), "an extension that is cut short")
+        if tag == b"DISP":
+            require(displacement is None, "two displacements")
+            displacement = read_displacement(data[at - length : at], width, height)
+    return displacement
+
+
+def read_displacement(data, width, height):  # section 3.4
+    """Spacing, step, and codes `[axis, row, column]`."""
+    require(len(data) >= 8, "a displacement that is cut short")
+    spacing, step = unpack_from("<H2xf", data)
+    require(SPACINGS[0] <= spacing <= SPACINGS[1], "the spacing of control points")
+    require(0 < step < math.inf, "the step of a displacement")
+    columns, rows = (-(-side // spacing) + 1 for side in (width, height))
+    require(columns * rows <= MAX_CONTROL_POINTS, "too many control points")
+    number = join_bytes(decompress(data[8:], 4 * columns * rows), "<u2").astype(int)
+    difference = np.where(number % 2 == 0, number >> 1, -(number >> 1) - 1)
+    codes = np.cumsum(difference.reshape(2, rows, columns), axis=2)
+    return spacing, float(step), (codes + 32768) % 65536 - 32768
 
 
 def read_metadata(data):  # appendix C
@@ -443,6 +464,9 @@ def window_origin(index, x, y):  # section 9
     a0, a1, a2, b0, b1, b2 = index.affine
     u = a0 * (x + 0.5) + a1 * (y + 0.5) + a2
     v = b0 * (x + 0.5) + b1 * (y + 0.5) + b2
+    if index.displacement:
+        u += displacement_at(index.displacement, 0, x, y)
+        v += displacement_at(index.displacement, 1, x, y)
 
     def limited_floor(value):
         if math.isnan(value):
@@ -450,6 +474,17 @@ def window_origin(index, x, y):  # section 9
         return math.floor(min(max(value, -(2.0**31)), 2.0**31 - 1))
 
     return limited_floor(u) - (index.w - 1) // 2, limited_floor(v) - (index.w - 1) // 2
+
+
+def displacement_at(displacement, axis, x, y):  # section 9
+    spacing, step, codes = displacement
+    code = codes[axis].tolist()
+    gx, gy = (x + 0.5) / spacing, (y + 0.5) / spacing
+    i, j = min(math.floor(gx), len(code[0]) - 2), min(math.floor(gy), len(code) - 2)
+    right, down = gx - i, gy - j
+    above = code[j][i] + (code[j][i + 1] - code[j][i]) * right
+    below = code[j + 1][i] + (code[j + 1][i + 1] - code[j + 1][i]) * right
+    return (above + (below - above) * down) * step
 
 
 def element_of_slot(index, origin, slot):  # section 9
@@ -480,7 +515,12 @@ def code_of_light(y):  # section 10
 def dump(file):  # appendix G
     tiles, basis = decode(file)
     values = [value for tile in tiles for value in tile] + [basis]
-    return b"".join(np.ascontiguousarray(value, "<f4").tobytes() for value in values)
+    values = b"".join(np.ascontiguousarray(value, "<f4").tobytes() for value in values)
+    index = FileIndex(file)
+    if index.displacement:
+        pixels = [(x, y) for y in range(index.height) for x in range(index.width)]
+        values += np.array([window_origin(index, x, y) for x, y in pixels], "<i4").tobytes()
+    return values
 
 
 def check(path):

@@ -6,7 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use common::relit::{self, TileContents};
-use common::tiled;
+use common::{bent, tiled};
 use proptest::prelude::*;
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::cpu::CpuRelighter;
@@ -14,14 +14,24 @@ use relightable_photo::relight::{Light, OutputTransform, TorchSpot, reference};
 use relightable_photo::transport::{Geometry, LightPosition, MAX_WINDOW, Tile};
 
 /// Grids, windows and tiles of all shapes, with correspondences that rotate, mirror and shift the picture until windows
-/// hang over the light plane's edges, or miss it.
+/// hang over the light plane's edges, or miss it, and bend.
 fn geometries() -> impl Strategy<Value = Geometry> {
     let sides = |most: u32| [1..=most, 1..=most];
     let window = prop_oneof![Just(1), Just(3), Just(15), Just(17), Just(MAX_WINDOW)];
     let row = || (-1.5..1.5, -1.5..1.5, -30.0..40.0).prop_map(|(a, b, c)| [a, b, c]);
-    (sides(21), sides(19), window, 8u32..=24, row(), row()).prop_map(
-        |(camera, light, window, tile_side, u, v)| tiled(camera, light, window, tile_side, [u, v]),
+    (
+        sides(21),
+        sides(19),
+        window,
+        8u32..=24,
+        row(),
+        row(),
+        any::<bool>(),
     )
+        .prop_map(|(camera, light, window, tile_side, u, v, bends)| {
+            let geometry = tiled(camera, light, window, tile_side, [u, v]);
+            if bends { bent(geometry) } else { geometry }
+        })
 }
 
 proptest! {
@@ -34,7 +44,7 @@ proptest! {
         exposure in 0.0..8.0f32,
     ) {
         let contents = [TileContents::Direct, TileContents::Factored, TileContents::Mixed][seed as usize % 3];
-        let transport = Arc::new(relit::asymmetric_transport(geometry, contents, seed));
+        let transport = Arc::new(relit::asymmetric_transport(geometry.clone(), contents, seed));
         // One relighter for all lights: the last light must leave nothing behind.
         let mut relighter = CpuRelighter::new(transport.clone());
         for (name, light) in relit::lights(geometry.light) {
@@ -53,7 +63,7 @@ fn windows_off_the_light_plane_are_dark() {
         let affine = [[0.5, 0.0, shift], [0.0, 0.5, 0.0]];
         let geometry = tiled([9, 8], [8, 8], 17, 8, affine);
         let transport = Arc::new(relit::asymmetric_transport(
-            geometry,
+            geometry.clone(),
             TileContents::Mixed,
             1,
         ));
@@ -79,7 +89,7 @@ fn a_moving_light_leaves_nothing_behind() {
         [[1.5, 0.02, 1.0], [0.0, 1.5, -2.0]],
     );
     let transport = Arc::new(relit::asymmetric_transport(
-        geometry,
+        geometry.clone(),
         TileContents::Mixed,
         3,
     ));
@@ -112,7 +122,7 @@ proptest! {
     #[test]
     fn row_ranges_give_the_same_picture_to_the_bit(geometry in geometries(), seed: u64) {
         let contents = [TileContents::Direct, TileContents::Factored, TileContents::Mixed][seed as usize % 3];
-        let transport = relit::asymmetric_transport(geometry, contents, seed);
+        let transport = relit::asymmetric_transport(geometry.clone(), contents, seed);
         let extent = geometry.camera;
         let middle = (geometry.tile_grid().height / 2 * geometry.tile_side).min(extent.height);
         let mut parts = [0..middle, middle..extent.height].map(|rows| {
@@ -158,7 +168,7 @@ fn lower_quality_is_the_first_components_and_can_be_undone() {
         [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
     );
     let transport = Arc::new(relit::asymmetric_transport(
-        geometry,
+        geometry.clone(),
         TileContents::Mixed,
         5,
     ));

@@ -8,7 +8,7 @@ mod common;
 use std::rc::Rc;
 
 use common::relit::{self, TileContents};
-use common::tiled;
+use common::{bent, tiled};
 use pollster::block_on;
 use relightable_photo::relight::backend::{BackendError, FrameRequest};
 use relightable_photo::relight::webgpu::{GpuContext, HeadlessRenderer};
@@ -36,7 +36,7 @@ fn transports() -> Vec<Transport> {
             TileContents::Factored,
         ),
         (
-            tiled([40, 44], [24, 21], 7, 16, rotated),
+            bent(tiled([40, 44], [24, 21], 7, 16, rotated)),
             TileContents::Mixed,
         ),
         (

@@ -11,7 +11,7 @@ mod common;
 use std::sync::OnceLock;
 
 use common::relit::{self, TileContents};
-use common::tiled;
+use common::{bent, tiled};
 use js_sys::{Float32Array, Object, Reflect, Uint8ClampedArray};
 use relightable_photo::format::{
     EncodedFile, EncoderInput, EncodingTarget, Limits, LtmReader, Metadata,
@@ -33,16 +33,16 @@ wasm_bindgen_test_configure!(run_in_browser);
 const BACKENDS: [&str; 3] = ["cpu", "webgl2", "webgpu"];
 
 /// Extents that no tile divides, windows smaller and larger than the light plane, correspondences that rotate and shift so
-/// that windows hang over every edge, more codes than a texture layer holds, windows that miss the light plane.
+/// that windows hang over every edge, one that bends, more codes than a texture layer holds, windows that miss the light plane.
 fn geometries() -> [Geometry; 6] {
     [
-        tiled(
+        bent(tiled(
             [37, 23],
             [19, 14],
             15,
             16,
             [[0.55, -0.12, -1.3], [0.1, 0.6, 0.4]],
-        ),
+        )),
         tiled(
             [40, 9],
             [13, 21],
@@ -78,10 +78,10 @@ fn geometries() -> [Geometry; 6] {
 
 /// The transport of one of the [`geometries`].
 fn transport(i: usize) -> Transport {
-    let geometry = geometries()[i];
+    let geometry = geometries()[i].clone();
     use TileContents::{Direct, Factored, Mixed};
     let contents = [Mixed, Factored, Direct, Factored, Direct, Mixed][i];
-    let mut transport = relit::asymmetric_transport(geometry, contents, i as u64);
+    let mut transport = relit::asymmetric_transport(geometry.clone(), contents, i as u64);
     if geometry.camera.area() > 10_000 {
         // Dark tiles save a minute of compression. One column of tiles stays lit, from the first texture layer to the last.
         let across = geometry.tile_grid().width as usize;
@@ -106,14 +106,14 @@ async fn next_task() {
 }
 
 fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
-    let geometry = transport.geometry;
+    let geometry = transport.geometry.clone();
     let tile = |i: usize| Ok(transport.tiles[i].dequantise(&geometry, &transport.basis));
     let factored = transport
         .tiles
         .iter()
         .any(|tile| !tile.coefficients.is_dark());
     let source = EncoderInput {
-        geometry,
+        geometry: geometry.clone(),
         basis: factored.then_some(&transport.basis),
         tile: &tile,
         metadata: metadata.clone(),
@@ -484,7 +484,7 @@ async fn a_photo_is_transferred_to_another_module_tile_by_tile() {
 
 #[wasm_bindgen_test]
 fn a_decoder_asks_for_each_byte_once() {
-    let transport = relit::asymmetric_transport(geometries()[0], TileContents::Direct, 0);
+    let transport = relit::asymmetric_transport(geometries()[0].clone(), TileContents::Direct, 0);
     let bytes = file(&transport, &Metadata::default());
     let mut decoder = Decoder::new(None);
     let mut asked = Vec::new();

@@ -28,9 +28,7 @@ pub fn geometry(side: u32) -> Geometry {
         camera: square(side),
         light: square(side / 2),
         window: Window::new(WINDOW).unwrap(),
-        correspondence: Correspondence {
-            affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
-        },
+        correspondence: Correspondence::from_affine([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]),
         tile_side: 128,
     }
 }

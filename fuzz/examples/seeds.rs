@@ -26,9 +26,7 @@ fn input(rank: usize) -> ArbitraryInput {
             height: 4,
         },
         window: Window::new(3).expect("an odd side"),
-        correspondence: Correspondence {
-            affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
-        },
+        correspondence: Correspondence::from_affine([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]),
         tile_side: 8,
     };
     let mut noise = Choices(&[7]).noise();

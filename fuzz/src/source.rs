@@ -57,9 +57,7 @@ pub fn geometry(choices: &mut Choices<'_>) -> Geometry {
         camera,
         light: Extent { width, height },
         window: Window::new(window).expect("an odd side"),
-        correspondence: Correspondence {
-            affine: [[0.5, 0.01, offset], [-0.02, 0.5, offset]],
-        },
+        correspondence: Correspondence::from_affine([[0.5, 0.01, offset], [-0.02, 0.5, offset]]),
         tile_side,
     }
     .validate()

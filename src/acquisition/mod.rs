@@ -2,14 +2,17 @@
 //!
 //! [`PatternSequence`] lists the pictures of a session: dark, flood, grey ramp, Gray code, and patterns with reference floods
 //! in between. [`DisplayLayout`] enlarges light elements to whole pixels of the display. [`SessionPlan`] says what the numbers
-//! mean for an object. [`SequenceBrightness`] checks that photographs are in the order of their pictures.
+//! mean for an object. [`SequenceBrightness`] checks that photographs are in the order of their pictures. [`DisplayedPicture`]
+//! recognises what another program showed.
 
 mod display_layout;
+mod displayed_picture;
 mod sequence;
 mod sequence_brightness;
 mod session_plan;
 
 pub use display_layout::{DisplayLayout, DisplayLayoutError};
+pub use displayed_picture::{DisplayedPicture, DisplayedRole};
 pub use sequence::{
     PatternSequence, PictureRole, SEQUENCE_NAME, SequenceError, SequencePicture, SequenceSettings,
 };

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::affine_fit::{GrayCodePosition, fit_affine_row};
+#[cfg(not(target_arch = "wasm32"))]
+use super::graycode_fit::GrayCodeFit;
 use crate::linalg;
 use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
 
@@ -133,11 +135,30 @@ impl GrayCodePhotos {
         })
     }
 
-    /// Decodes all pixels and fits an affine map to their positions. `camera` is the size of the camera grid.
+    /// Decodes all pixels and fits a correspondence to their positions: an affine map, and a displacement if the
+    /// correspondence bends. `camera` is the size of the camera grid.
     ///
     /// # Errors
     /// If an axis has no bits or too few pixels can be decoded.
-    pub fn correspondence(&self, camera: Extent) -> Result<Correspondence, CalibrationError> {
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn fit(&self, camera: Extent) -> Result<GrayCodeFit, CalibrationError> {
+        let [(u, u_row), (v, v_row)] = self.decode(camera)?;
+        let pixels = self.rows.len() * camera.width as usize;
+        Ok(GrayCodeFit::new(camera, pixels, [&u, &v], [u_row, v_row]))
+    }
+
+    /// Decodes all pixels and fits an affine correspondence to their positions, for modules that pages load: they have no room
+    /// for more.
+    ///
+    /// # Errors
+    /// Those of `fit`.
+    pub fn fit_affine(&self, camera: Extent) -> Result<Correspondence, CalibrationError> {
+        let [(_, u_row), (_, v_row)] = self.decode(camera)?;
+        Ok(Correspondence::from_affine([u_row, v_row]))
+    }
+
+    /// The positions along u and v, each with the row of the affine map.
+    fn decode(&self, camera: Extent) -> Result<[DecodedAxis; 2], CalibrationError> {
         let axis = |bits: &[BitPair], axis| {
             if bits.is_empty() {
                 return Err(CalibrationError::MissingBits(axis));
@@ -145,17 +166,19 @@ impl GrayCodePhotos {
             let pixels = decode(bits, &self.rows, camera.width);
             let decoded = pixels.len();
             let row = (decoded >= MIN_DECODED_PIXELS).then(|| fit_affine_row(&pixels));
-            row.flatten()
-                .ok_or(CalibrationError::TooFewPixels { decoded, axis })
+            let row = row.flatten();
+            let row = row.ok_or(CalibrationError::TooFewPixels { decoded, axis })?;
+            Ok((pixels, row))
         };
-        Ok(Correspondence {
-            affine: [
-                axis(&self.x, LightPlaneAxis::X)?,
-                axis(&self.y, LightPlaneAxis::Y)?,
-            ],
-        })
+        Ok([
+            axis(&self.x, LightPlaneAxis::X)?,
+            axis(&self.y, LightPlaneAxis::Y)?,
+        ])
     }
 }
+
+/// The positions along an axis, and the row of the affine map that fits them.
+type DecodedAxis = (Vec<GrayCodePosition>, [f64; 3]);
 
 /// Positions along one axis of the pixels with at least half of their bits clear.
 fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<GrayCodePosition> {
@@ -203,7 +226,7 @@ mod tests {
 
     /// Ideal photographs of Gray code through a known map, blurred over `blur` elements.
     fn photograph(camera: Extent, affine: [[f64; 3]; 2], bits: u32, blur: f64) -> GrayCodePhotos {
-        let map = Correspondence { affine };
+        let map = Correspondence::from_affine(affine);
         let axis = |along: LightPlaneAxis| {
             let bit = |b: u32| {
                 let brightness = |n: usize| -> f32 {
@@ -241,9 +264,12 @@ mod tests {
         let camera = Extent::new(60, 40);
         let affine = [[0.5, 0.02, 1.3], [-0.03, 0.45, 4.0]];
         for blur in [0.0, 0.8, 2.0] {
-            let found = photograph(camera, affine, 5, blur).correspondence(camera);
-            let found = Correspondence::at(&found.unwrap(), CameraPixel { x: 50, y: 5 });
-            let truth = Correspondence { affine }.at(CameraPixel { x: 50, y: 5 });
+            let found = photograph(camera, affine, 5, blur).fit(camera);
+            let found = found
+                .unwrap()
+                .correspondence
+                .at(CameraPixel { x: 50, y: 5 });
+            let truth = Correspondence::from_affine(affine).at(CameraPixel { x: 50, y: 5 });
             let apart = (found.u - truth.u).hypot(found.v - truth.v);
             assert!(apart < 0.1, "blur {blur}: {apart} elements off");
         }
@@ -275,7 +301,7 @@ mod tests {
             bit.plain.fill([0.0; 3]);
             bit.inverted.fill([0.0; 3]);
         }
-        let error = code.correspondence(camera);
+        let error = code.fit(camera);
         assert_eq!(
             error,
             Err(CalibrationError::TooFewPixels {
@@ -284,7 +310,7 @@ mod tests {
             })
         );
         assert_eq!(
-            GrayCodePhotos::default().correspondence(camera),
+            GrayCodePhotos::default().fit(camera),
             Err(CalibrationError::MissingBits(LightPlaneAxis::X))
         );
     }

@@ -1,6 +1,12 @@
 //! Calibration of the set-up: the correspondence from photographs of Gray code.
 
 mod affine_fit;
+#[cfg(not(target_arch = "wasm32"))]
+mod displacement_fit;
 mod graycode;
+#[cfg(not(target_arch = "wasm32"))]
+mod graycode_fit;
 
 pub use graycode::{BitPair, CalibrationError, GrayCodePhotos, LightPlaneAxis};
+#[cfg(not(target_arch = "wasm32"))]
+pub use graycode_fit::{GrayCodeFit, ResidualSummary};

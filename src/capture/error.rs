@@ -80,6 +80,11 @@ pub enum CaptureErrorKind {
     /// The correspondence has no inverse.
     #[error("\"correspondence.affine\" is not an invertible map of finite numbers")]
     NotInvertible,
+    /// The displacement is that of pictures of another size.
+    #[error(
+        "\"correspondence.displacement\" has control points for pictures of another size than \"camera\""
+    )]
+    DisplacementOfOtherPicture,
     /// A bit of the Gray code was not photographed.
     #[error("\"graycode\" has no photograph of axis {axis}, bit {bit}, inverted {inverted}")]
     MissingGrayCode {

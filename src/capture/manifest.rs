@@ -322,11 +322,19 @@ impl Manifest {
             let allowed = format!("between 0 and {MAX_GRAY_CODE_BIT}");
             check_range(*bit <= MAX_GRAY_CODE_BIT, &field, bit, &allowed)?;
         }
-        if let Some(Correspondence { affine }) = &self.correspondence {
+        if let Some(Correspondence {
+            affine,
+            displacement,
+        }) = &self.correspondence
+        {
             let [[a, b, _], [c, d, _]] = affine;
             let finite = affine.iter().flatten().all(|x| x.is_finite());
             if !finite || a * d - b * c == 0.0 {
                 return Err(CaptureErrorKind::NotInvertible);
+            }
+            let camera = self.camera.extent();
+            if displacement.as_ref().is_some_and(|grid| !grid.fits(camera)) {
+                return Err(CaptureErrorKind::DisplacementOfOtherPicture);
             }
         }
         Ok(())

@@ -271,7 +271,7 @@ mod tests {
         Measurements {
             camera,
             light,
-            correspondence: scene.geometry().correspondence,
+            correspondence: scene.geometry().correspondence.clone(),
             patterns: vec![Pattern::Grey(Vec::new()); patterns as usize],
             full_scale: (1..=patterns as usize)
                 .map(|i| exposure(i).recip() as f32)

@@ -123,7 +123,7 @@ impl EvaluateReport {
         relighter: &mut CpuRelighter,
         truth: GroundTruth,
     ) -> Result<()> {
-        let geometry = relighter.transport().geometry;
+        let geometry = relighter.transport().geometry.clone();
         for name in truth.lights()? {
             let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?.rgb())?;
             relighter.relight(&light, &AllCoresExecutor);
@@ -133,7 +133,7 @@ impl EvaluateReport {
             let psnr = psnr(&truth.relit(&name)?, &relit);
             self.relit.insert(name, psnr);
         }
-        let known = CaptureTruth::new(truth, geometry.correspondence)?;
+        let known = CaptureTruth::new(truth, geometry.correspondence.clone())?;
         let transport = relighter.transport();
         let errors = transport.tiles.par_iter().map(|tile| {
             let functions = tile.functions(&geometry, &transport.basis);

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::ltm_file::open_ltm;
 use super::report::{format_bytes, format_shots, print_json, print_line};
 use crate::format::{FileIndex, Metadata, ScanCoding};
-use crate::transport::Decibels;
+use crate::transport::{Decibels, Extent};
 
 /// Show the contents of a relightable photograph; reads its file index only
 #[derive(Debug, Args)]
@@ -24,11 +24,21 @@ pub struct InspectArgs {
 }
 
 #[derive(Serialize)]
+struct DisplacementReport {
+    /// Along a row and down a column.
+    control_points: [u32; 2],
+    /// Largest length, in light elements.
+    largest: f64,
+}
+
+#[derive(Serialize)]
 struct InspectReport {
     camera: [u32; 2],
     light: [u32; 2],
     window: u32,
     correspondence: [[f64; 3]; 2],
+    /// If the correspondence bends.
+    displacement: Option<DisplacementReport>,
     tile_side: u32,
     tiles: usize,
     /// Tiles without any chunk.
@@ -126,6 +136,13 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         light: [geometry.light.width, geometry.light.height],
         window: geometry.window.side(),
         correspondence: geometry.correspondence.affine,
+        displacement: geometry.correspondence.displacement.as_ref().map(|grid| {
+            let Extent { width, height } = grid.points();
+            DisplacementReport {
+                control_points: [width, height],
+                largest: grid.largest(),
+            }
+        }),
         tile_side: geometry.tile_side,
         tiles: index.tiles(),
         dark_tiles: count(|tile| **tile == [false; 2]),
@@ -152,6 +169,11 @@ fn print(report: &InspectReport) -> Result<()> {
     let [camera, light] = [report.camera, report.light].map(|[w, h]| format!("{w}x{h}"));
     let rank = report.rank.map(|rank| rank.to_string());
     let metadata = &report.metadata;
+    let displacement = report.displacement.as_ref().map(|displacement| {
+        let [columns, rows] = displacement.control_points;
+        let largest = displacement.largest;
+        format!("at {columns}x{rows} control points, by up to {largest:.1} light elements")
+    });
     let tiles = format!(
         "{} of {1}x{1} pixels: {2} direct, {3} factored, {4} dark",
         report.tiles,
@@ -168,6 +190,7 @@ fn print(report: &InspectReport) -> Result<()> {
         ("light", light),
         ("window", format!("{0}x{0}", report.window)),
         ("correspondence", format!("u = {a:?}, v = {b:?}")),
+        ("displacement", displacement.unwrap_or_default()),
         ("tiles", tiles),
         ("rank", rank.unwrap_or_default()),
         ("recovered", format_recovery(metadata)),

@@ -18,12 +18,15 @@ pub fn read_patterns(
     shots: &[usize],
     gray_code_rows: &CameraRowSet,
 ) -> Result<Measurements> {
-    let correspondence = match folder.manifest().correspondence {
-        Some(correspondence) => correspondence,
-        None => folder
-            .read_gray_code(dark, gray_code_rows)?
-            .correspondence(folder.manifest().camera.extent())
-            .with_context(|| folder.manifest_path().display().to_string())?,
+    let correspondence = match &folder.manifest().correspondence {
+        Some(correspondence) => correspondence.clone(),
+        None => {
+            folder
+                .read_gray_code(dark, gray_code_rows)?
+                .fit(folder.manifest().camera.extent())
+                .with_context(|| folder.manifest_path().display().to_string())?
+                .correspondence
+        }
     };
     let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
     let patterns = patterns.collect::<Result<Vec<_>, _>>()?;

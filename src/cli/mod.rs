@@ -5,8 +5,10 @@
 
 mod advice;
 mod assemble;
+mod calibrate;
 mod capture_writer;
 mod evaluate;
+mod import;
 mod inspect;
 mod ltm_file;
 mod measurement_reader;
@@ -41,6 +43,8 @@ struct Cli {
 enum Command {
     Patterns(patterns::PatternsArgs),
     Assemble(assemble::AssembleArgs),
+    Import(import::ImportArgs),
+    Calibrate(calibrate::CalibrateArgs),
     Simulate(simulate::SimulateArgs),
     Photograph(photograph::PhotographArgs),
     Recover(recover::RecoverArgs),
@@ -65,6 +69,8 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Patterns(args) => patterns::run(&args),
         Command::Assemble(args) => assemble::run(&args),
+        Command::Import(args) => import::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Photograph(args) => photograph::run(&args),
         Command::Recover(args) => recover::run(&args),

@@ -5,7 +5,7 @@ use std::io::BufWriter;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use half::f16;
 use image::ExtendedColorType;
@@ -14,14 +14,14 @@ use rayon::prelude::*;
 
 use super::capture_writer::{MAX_ELECTRONS, write_png};
 use super::report::format_bytes;
-use super::value_parsers::parse_extent;
+use super::value_parsers::{UsageError, parse_extent, parse_number};
 use super::{output_folder, progress};
 use crate::capture::{
     MANIFEST_NAME, Manifest, ManifestCamera, ManifestLight, RELIT_FULL_SCALE, Shot,
 };
 use crate::simulate::{
-    Camera, EmissionMatrix, GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage,
-    RandomStreamId, SceneKind, SimulatedScene, truth_lights,
+    Camera, CameraView, EmissionMatrix, GrayCodePattern, MONITOR_GAMMA, PatternEnsemble,
+    PatternImage, RandomStreamId, SceneKind, SimulatedScene, truth_lights,
 };
 use crate::transport::{CHANNELS, CameraPixel, Extent, TileRect, TileTransportFunctions};
 
@@ -64,6 +64,34 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "N", default_value_t = 40_000,
           value_parser = clap::value_parser!(u64).range(1..=MAX_ELECTRONS))]
     electrons: u64,
+    /// Radial distortion of the lens at the picture's corners, in percent; of stained-glass
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.0, allow_negative_numbers = true,
+          value_parser = |text: &str| parse_number(text, -20.0, 20.0))]
+    distortion: f32,
+    /// Angle at which the camera looks aslant, in degrees; of stained-glass
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true,
+          value_parser = |text: &str| parse_number(text, -30.0, 30.0))]
+    tilt: f32,
+}
+
+impl SimulateArgs {
+    fn build_scene(&self) -> Result<Box<dyn SimulatedScene>> {
+        let view = CameraView {
+            distortion: f64::from(self.distortion) / 100.0,
+            tilt: f64::from(self.tilt),
+        };
+        if view == CameraView::default() {
+            return Ok(self.scene.build(self.camera, self.light)?);
+        }
+        if self.scene != SceneKind::StainedGlass {
+            bail!(UsageError("--distortion and --tilt go with stained-glass"));
+        }
+        Ok(SceneKind::build_stained_glass(
+            self.camera,
+            self.light,
+            view,
+        )?)
+    }
 }
 
 pub fn run(args: &SimulateArgs) -> Result<()> {
@@ -108,7 +136,7 @@ struct SimulatedPictureFiles {
 
 impl<'a> SimulationPlan<'a> {
     fn new(args: &'a SimulateArgs) -> Result<Self> {
-        let scene = args.scene.build(args.camera, args.light)?;
+        let scene = args.build_scene()?;
         let mut plan = Self {
             args,
             manifest: Manifest {
@@ -128,7 +156,7 @@ impl<'a> SimulationPlan<'a> {
                 },
                 dark: Some("photos/dark.png".to_owned()),
                 flood: Some("photos/flood.png".to_owned()),
-                correspondence: Some(scene.geometry().correspondence),
+                correspondence: Some(scene.geometry().correspondence.clone()),
                 ..Manifest::default()
             },
             scene,

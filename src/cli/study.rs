@@ -225,7 +225,7 @@ impl<'a> StudySubject<'a> {
         // The flood light shows most of the object.
         lights.sort_by_key(|light| light.name != "flood");
         let measurements = read_measurements(&folder)?;
-        let known = CaptureTruth::new(truth, measurements.correspondence)?;
+        let known = CaptureTruth::new(truth, measurements.correspondence.clone())?;
         self.figures(&known, measurements, lights)
     }
 

@@ -90,7 +90,7 @@ pub fn encode_file(
 pub fn file_geometry(recovery: &PreparedRecovery) -> Geometry {
     Geometry {
         tile_side: FILE_TILE_SIDE,
-        ..*recovery.geometry()
+        ..recovery.geometry().clone()
     }
 }
 

@@ -1,4 +1,4 @@
-//! Bounds and record sizes of the format, version 1.0 (`docs/format.md`, appendix A).
+//! Bounds and record sizes of the format, version 1.1 (`docs/format.md`, appendix A).
 
 /// Bytes of the fixed header.
 pub const HEADER_BYTES: usize = 144;

@@ -1,5 +1,6 @@
 //! Extensions: blocks of data that later versions and other programs add to a file.
 
+use super::displacement;
 use super::error::{FormatError, SectionName};
 use super::fields::FieldReader;
 use super::memory_budget::MemoryBudget;
@@ -9,7 +10,7 @@ const RECORD_HEADER_BYTES: usize = 12;
 /// The flag of an extension that a reader must know to read the file.
 const MUST_UNDERSTAND: u32 = 1;
 
-/// A named block of data. This version knows none; it keeps those that a reader may ignore.
+/// A named block of data. Those that this version does not know, and may ignore, are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FormatExtension {
     /// Its name: four ASCII characters.
@@ -21,7 +22,7 @@ pub struct FormatExtension {
 }
 
 /// The records of `extensions` one after another.
-pub(super) fn encode(extensions: &[FormatExtension]) -> Vec<u8> {
+pub(super) fn encode<'a>(extensions: impl Iterator<Item = &'a FormatExtension>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for extension in extensions {
         let flags = u32::from(extension.must_understand) * MUST_UNDERSTAND;
@@ -33,29 +34,46 @@ pub(super) fn encode(extensions: &[FormatExtension]) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn decode(
-    bytes: &[u8],
+/// The extensions of a file.
+#[derive(Debug, Default)]
+pub(super) struct Extensions<'a> {
+    /// The data of the displacement of the correspondence.
+    pub displacement: Option<&'a [u8]>,
+    /// Those that a reader may ignore.
+    pub others: Vec<FormatExtension>,
+}
+
+pub(super) fn decode<'a>(
+    bytes: &'a [u8],
     budget: &MemoryBudget,
-) -> Result<Vec<FormatExtension>, FormatError> {
-    let cut = || FormatError::DamagedSection {
+) -> Result<Extensions<'a>, FormatError> {
+    let damaged = |reason: &str| FormatError::DamagedSection {
         section: SectionName::Extensions,
-        reason: "the last one is cut".to_owned(),
+        reason: reason.to_owned(),
     };
-    let (mut fields, mut extensions) = (FieldReader(bytes), Vec::new());
+    let cut = || damaged("the last one is cut");
+    let (mut fields, mut extensions) = (FieldReader(bytes), Extensions::default());
     while !fields.0.is_empty() {
         let header = fields.try_bytes(RECORD_HEADER_BYTES).ok_or_else(cut)?;
         let tag = [header[0], header[1], header[2], header[3]];
         let [flags, length] = FieldReader(&header[4..]).u32s();
-        if flags & MUST_UNDERSTAND != 0 {
+        let is_known = tag == displacement::TAG;
+        if flags & MUST_UNDERSTAND != 0 && !is_known {
             return Err(FormatError::UnknownExtension(tag));
         }
         let data = fields.try_bytes(length as usize).ok_or_else(cut)?;
+        if is_known {
+            if extensions.displacement.replace(data).is_some() {
+                return Err(damaged("there are two displacements"));
+            }
+            continue;
+        }
         let extension = FormatExtension {
             tag,
             must_understand: false,
             data: budget.try_copy(data)?,
         };
-        budget.try_push(&mut extensions, extension)?;
+        budget.try_push(&mut extensions.others, extension)?;
     }
     Ok(extensions)
 }

@@ -10,7 +10,9 @@ use crate::transport::{Correspondence, Geometry};
 
 /// Version of written files. A reader accepts other minor versions and refuses other major ones.
 const MAJOR: u16 = 1;
+/// Minor version of a file, and of one whose correspondence bends.
 const MINOR: u16 = 0;
+const MINOR_WITH_DISPLACEMENT: u16 = 1;
 /// The magic number. A high bit, CR LF, ^Z and LF show damage by text mode, as in PNG and KTX2. The
 /// digits are those of version 1.0 and stand for major version 1.
 const MAGIC: [u8; 12] = *b"\xABLTM 10\xBB\r\n\x1A\n";
@@ -20,9 +22,9 @@ const MAGIC_NAME_BYTES: usize = 4;
 const MAGIC_VERSION: std::ops::Range<usize> = 5..7;
 
 /// The fixed header, checked.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// Grids, window, correspondence and tiling.
+    /// Grids, window, correspondence and tiling. The displacement of the correspondence is that of the extension `DISP`.
     pub geometry: Geometry,
     /// Bytes of the whole file.
     pub file_bytes: u64,
@@ -65,7 +67,11 @@ impl Header {
     pub(super) fn encode(&self) -> [u8; HEADER_BYTES] {
         let mut out = Vec::with_capacity(HEADER_BYTES);
         out.extend(MAGIC);
-        out.extend([MAJOR, MINOR].map(u16::to_le_bytes).as_flattened());
+        let minor = match self.geometry.correspondence.displacement {
+            Some(_) => MINOR_WITH_DISPLACEMENT,
+            None => MINOR,
+        };
+        out.extend([MAJOR, minor].map(u16::to_le_bytes).as_flattened());
         for side in self.geometry.sides().as_flattened() {
             out.extend(side.to_le_bytes());
         }
@@ -105,7 +111,7 @@ impl Header {
             SectionEntry { bytes, crc }
         };
         let header = Self {
-            geometry: Geometry::from_sides(sides, Correspondence { affine })
+            geometry: Geometry::from_sides(sides, Correspondence::from_affine(affine))
                 .map_err(FormatError::InvalidGeometry)?,
             file_bytes,
             rank: rank as u16, // checked below

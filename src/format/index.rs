@@ -7,8 +7,9 @@ use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::{compress, decompress};
 use super::constants::HEADER_BYTES;
 use super::directory;
+use super::displacement;
 use super::error::{FormatError, SectionName};
-use super::extension::{self, FormatExtension};
+use super::extension::{self, Extensions, FormatExtension};
 use super::header::{Header, SectionEntry};
 use super::memory_budget::MemoryBudget;
 use super::metadata::{Metadata, MetadataText};
@@ -35,7 +36,7 @@ pub struct FileIndex {
 impl FileIndex {
     /// Reads the [`index_bytes`](Header::index_bytes) of a file whose header is `header`.
     pub(super) fn decode(
-        header: Header,
+        mut header: Header,
         bytes: &[u8],
         budget: &MemoryBudget,
     ) -> Result<Self, FormatError> {
@@ -48,21 +49,30 @@ impl FileIndex {
         let frame = take(header.directory, SectionName::Directory)?;
         let extensions = take(header.extensions, SectionName::Extensions)?;
         let metadata = take(header.metadata, SectionName::Metadata)?;
-        let extensions = extension::decode(extensions, budget)?;
+        let Extensions {
+            displacement,
+            others,
+        } = extension::decode(extensions, budget)?;
+        if let Some(data) = displacement {
+            let grid = displacement::decode(data, header.geometry.camera, budget)
+                .map_err(|error| error.in_section(SectionName::Extensions))?;
+            header.geometry.correspondence.displacement = Some(grid.into());
+        }
         let content_bytes = usize::try_from(directory::content_bytes(&header));
         let records = decompress(frame, content_bytes.unwrap_or(usize::MAX), budget)
             .map_err(|error| error.in_section(SectionName::Directory))?;
         let (scans, entries) = directory::decode(&header, &records, budget)?;
         budget.release_vec(records);
+        let file_bytes = header.file_bytes;
         let index = Self {
             offsets: offsets(&header, &scans, &entries, budget)?,
             header,
             scans,
             entries,
-            extensions,
+            extensions: others,
             metadata: MetadataText::decode(metadata, budget)?,
         };
-        let (end, file_bytes) = (index.offsets[index.offsets.len() - 1], header.file_bytes);
+        let end = index.offsets[index.offsets.len() - 1];
         match end == file_bytes {
             true => Ok(index),
             false => Err(FormatError::LengthMismatch { end, file_bytes }),
@@ -78,7 +88,11 @@ impl FileIndex {
         metadata: &Metadata,
     ) -> Result<(Self, Vec<u8>), FormatError> {
         let directory = compress(&directory::encode(&scans, &entries))?;
-        let extension_bytes = extension::encode(&extensions);
+        let displacement = geometry.correspondence.displacement.as_ref();
+        let displacement = displacement
+            .map(|grid| displacement::encode(grid))
+            .transpose()?;
+        let extension_bytes = extension::encode(displacement.iter().chain(&extensions));
         let metadata = MetadataText::encode(metadata)?;
         let json = metadata.text().as_bytes();
         let mut header = Header {

@@ -42,9 +42,9 @@ pub(super) fn index_bytes(header: &Header) -> u64 {
 
 /// Bytes that reading the whole file takes.
 pub(super) fn file_bytes(index: &FileIndex) -> u64 {
-    let Header { geometry, rank, .. } = index.header;
+    let Header { geometry, rank, .. } = &index.header;
     let value = (CHANNELS * size_of::<f32>()) as u64;
-    let rank = usize::from(rank);
+    let rank = usize::from(*rank);
     let is_factored = |tile: usize| {
         let mut scans = index.scans.iter().enumerate();
         scans.any(|(i, scan)| !scan.coding.is_direct() && index.entry(i, tile).bytes > 0)

@@ -1,9 +1,9 @@
-//! The `.ltm` file, version 1.0, as `docs/format.md` specifies it.
+//! The `.ltm` file, version 1.1, as `docs/format.md` specifies it.
 //!
 //! ```text
 //! index         header       144 bytes, little endian: grids, window, correspondence, lengths, checksums
 //!               directory    zstd frame: a record for each scan, length and checksum of each chunk
-//!               extensions   data of later versions
+//!               extensions   the displacement of a correspondence that bends; data of later versions
 //!               metadata     JSON
 //! scans         each a basis chunk, then a tile chunk for each tile
 //! ```
@@ -19,6 +19,7 @@ mod chunk;
 mod codec;
 mod constants;
 mod directory;
+mod displacement;
 mod encode;
 mod error;
 mod extension;

@@ -359,7 +359,7 @@ impl PartialFile {
             });
         }
         Ok(Transport {
-            geometry: self.index.header.geometry,
+            geometry: self.index.header.geometry.clone(),
             basis: Basis { kernels },
             tiles,
         })

@@ -99,7 +99,7 @@ impl LtmReader {
         let state = self.state.as_ref();
         ReadProgress {
             bytes: self.received_bytes(),
-            file_bytes: self.header.map(|header| header.file_bytes),
+            file_bytes: self.header.as_ref().map(|header| header.file_bytes),
             scans: state.map_or(0, PartialFile::complete_scans),
             tiles: state.map_or(0, PartialFile::complete_tiles),
         }
@@ -107,7 +107,7 @@ impl LtmReader {
 
     /// Bytes of the index, once the header is known.
     pub fn index_bytes(&self) -> Option<u64> {
-        self.header.map(|header| header.index_bytes())
+        self.header.as_ref().map(Header::index_bytes)
     }
 
     /// The file index, once it is complete.
@@ -160,7 +160,7 @@ impl LtmReader {
 
     /// Decodes the header and the index when their bytes are complete.
     fn advance(&mut self) -> Result<(), FormatError> {
-        let Some(header) = self.header else {
+        let Some(header) = &self.header else {
             header::check_magic(&self.gathered)?;
             let Some(bytes) = self.gathered.first_chunk::<HEADER_BYTES>() else {
                 return Ok(());
@@ -173,7 +173,7 @@ impl LtmReader {
             return self.advance();
         };
         if self.gathered.len() as u64 == header.index_bytes() {
-            let index = FileIndex::decode(header, &self.gathered, &self.budget)?;
+            let index = FileIndex::decode(header.clone(), &self.gathered, &self.budget)?;
             self.budget.check(memory_estimate::file_bytes(&index))?;
             self.state = Some(PartialFile::new(index, &self.budget)?);
             self.budget.release_vec(std::mem::take(&mut self.gathered));
@@ -183,7 +183,7 @@ impl LtmReader {
 
     /// The error of a file that ends after the bytes received.
     pub fn truncated(&self) -> FormatError {
-        let need = self.header.map(|header| header.file_bytes);
+        let need = self.header.as_ref().map(|header| header.file_bytes);
         FormatError::Truncated {
             got: self.received_bytes(),
             need: need.unwrap_or(HEADER_BYTES as u64),

@@ -6,6 +6,8 @@
 //! WebAssembly they are written out. No function fuses a multiplication with an addition or sums in an order that depends
 //! on the width of a register, so every machine returns the same bits.
 
+#[cfg(not(target_arch = "wasm32"))]
+mod banded;
 mod cholesky;
 mod cosine;
 mod eigen;
@@ -15,6 +17,8 @@ mod order;
 mod vector;
 mod vectorise;
 
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) use banded::BandedMatrix;
 pub(crate) use cholesky::{cholesky, cholesky_inverse, cholesky_solve, cholesky_with_ridge};
 pub(crate) use cosine::cos_pi;
 pub(crate) use eigen::{symmetric_eigen, symmetric_eigenvalues};

@@ -81,20 +81,10 @@ impl LightPlaneSymmetry {
     pub fn of_correspondence(
         self,
         light: Extent,
-        correspondence: Correspondence,
+        correspondence: &Correspondence,
     ) -> Correspondence {
-        let [mut u, mut v] = correspondence.affine;
-        if self.is_transposed {
-            (u, v) = (v, u);
-        }
-        let reverse = |[x, y, shift]: [f64; 3], side: u32| [-x, -y, f64::from(side) - shift];
-        if self.is_mirrored {
-            u = reverse(u, light.width);
-        }
-        if self.is_flipped {
-            v = reverse(v, light.height);
-        }
-        Correspondence { affine: [u, v] }
+        let reversed = [self.is_mirrored, self.is_flipped];
+        correspondence.turned(light, self.is_transposed, reversed)
     }
 }
 
@@ -257,7 +247,7 @@ impl<E: Executor> Search<'_, E> {
         let light = self.measurements.light;
         let symmetries: Vec<LightPlaneSymmetry> = LightPlaneSymmetry::all(light).collect();
         let correlations = self.executor.map(symmetries.len(), |i| {
-            let changed = symmetries[i].of_correspondence(light, self.measurements.correspondence);
+            let changed = symmetries[i].of_correspondence(light, &self.measurements.correspondence);
             (typical(&self.relative_responses(&changed)), symmetries[i])
         });
         let best = correlations
@@ -501,16 +491,16 @@ mod tests {
         for symmetry in LightPlaneSymmetry::all(Extent::new(16, 16)) {
             let mut right = None;
             let change = |measurements: &mut Measurements| {
-                let correspondence = measurements.correspondence;
+                let correspondence = measurements.correspondence.clone();
                 measurements.correspondence =
-                    symmetry.of_correspondence(measurements.light, correspondence);
-                right = Some((correspondence, measurements.correspondence));
+                    symmetry.of_correspondence(measurements.light, &correspondence);
+                right = Some((correspondence, measurements.correspondence.clone()));
             };
             let Some(CaptureFault::Correspondence(found)) = fault(change) else {
                 panic!("{symmetry:?} is not found");
             };
             let (correspondence, wrong) = right.unwrap();
-            let put_right = found.of_correspondence(Extent::new(16, 16), wrong);
+            let put_right = found.of_correspondence(Extent::new(16, 16), &wrong);
             assert_eq!(put_right, correspondence, "{symmetry:?}");
         }
     }

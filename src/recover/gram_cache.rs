@@ -71,7 +71,7 @@ impl GramCache {
     /// colour of `channel`.
     pub fn new(
         measurements: &CalibratedMeasurements<'_>,
-        geometry: Geometry,
+        geometry: &Geometry,
         pattern_indices: &[usize],
         channel: usize,
         origins: &[LightElement],
@@ -98,7 +98,7 @@ impl GramCache {
             }
         }
         let mut cache = Self {
-            geometry,
+            geometry: geometry.clone(),
             region,
             pattern_indices: pattern_indices.to_vec(),
             weights: pattern_indices.iter().map(|&i| weights[i]).collect(),
@@ -262,9 +262,7 @@ mod tests {
         Measurements {
             camera: LIGHT,
             light: LIGHT,
-            correspondence: Correspondence {
-                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            },
+            correspondence: Correspondence::from_affine([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
             patterns: patterns.collect(),
             full_scale: (0..PATTERNS).map(|l| 0.5 + 0.2 * l as f32).collect(),
             rows: CameraRowSet::all(LIGHT.height),
@@ -286,7 +284,7 @@ mod tests {
         let window = Window::new(3).unwrap();
         let geometry = preparation_input::geometry(&measurements, window).unwrap();
         let cache = |origins: &[LightElement]| {
-            GramCache::new(&measurements, geometry, &indices, 0, origins)
+            GramCache::new(&measurements, &geometry, &indices, 0, origins)
         };
         let origins: Vec<LightElement> = (-2..=4)
             .flat_map(|v| (-1..=5).map(move |u| LightElement { v, u }))

@@ -66,7 +66,7 @@ impl HoldoutValidation {
     ) -> Result<Option<Self>, RecoverError> {
         let &RecoveryPreparationInput {
             measurements,
-            geometry,
+            ref geometry,
             split,
             executor,
         } = preparation;
@@ -86,8 +86,8 @@ impl HoldoutValidation {
         let squares = executor.map(own.len(), |j| {
             let i = own.start + j;
             let tile = recover_from_training(rects[i]);
-            let functions = tile.functions(&geometry, basis);
-            let residual = residual_variance(&samples[i], &geometry, &held_out, &functions);
+            let functions = tile.functions(geometry, basis);
+            let residual = residual_variance(&samples[i], geometry, &held_out, &functions);
             let (signal, noise) = variances(measurements, split, rects[i]);
             (tile, [signal, noise, residual])
         });
@@ -114,7 +114,7 @@ impl HoldoutValidation {
                 },
             );
         Ok(Some(Self {
-            geometry,
+            geometry: geometry.clone(),
             squares: squares.collect(),
             signal,
             noise,
@@ -244,7 +244,7 @@ mod tests {
         let functions = capture.functions(factor);
         let preparation = RecoveryPreparationInput {
             measurements: &CalibratedMeasurements::uncorrected(&capture.measurements),
-            geometry: capture.geometry,
+            geometry: capture.geometry.clone(),
             split: &HoldoutSplit::new(&capture.measurements.patterns),
             executor: &SequentialExecutor,
         };

@@ -37,7 +37,7 @@ impl PixelwiseRecovery {
         preparation.executor.check_cancelled()?;
         let sample = sample_windows(preparation, LEAST_SQUARES_SAMPLE)?;
         let candidates = CommonModeWeight::CANDIDATES.map(|common_mode| Self {
-            geometry: preparation.geometry,
+            geometry: preparation.geometry.clone(),
             common_mode,
             problem: PixelwiseMethod::LeastSquares,
         });
@@ -59,7 +59,7 @@ impl PixelwiseRecovery {
         let sample = sample_windows(preparation, DENOISING_SAMPLE)?;
         let candidates = ResidualTolerance::CANDIDATE_SHARES.map(|share| Self {
             problem: PixelwiseMethod::Denoising(basis, ResidualTolerance { share, ..noise }),
-            ..least_squares
+            ..least_squares.clone()
         });
         Ok(best_of(candidates, preparation, &sample).await?)
     }
@@ -158,7 +158,7 @@ async fn best_of<const N: usize>(
     sample: &[PixelsByWindow],
 ) -> Result<PixelwiseRecovery, Cancelled> {
     let (measurements, split) = (preparation.measurements, preparation.split);
-    let mut best = candidates[0];
+    let mut best = candidates[0].clone();
     if split.held_out.is_empty() {
         return Ok(best);
     }

@@ -226,7 +226,7 @@ mod tests {
     fn fit(capture: &SyntheticCapture) -> Result<Vec<f64>, RecoverError> {
         pollster::block_on(mean_function(&RecoveryPreparationInput {
             measurements: &CalibratedMeasurements::uncorrected(&capture.measurements),
-            geometry: capture.geometry,
+            geometry: capture.geometry.clone(),
             split: &HoldoutSplit::new(&capture.measurements.patterns),
             executor: &SequentialExecutor,
         }))

@@ -35,7 +35,7 @@ pub(super) enum PixelwiseMethod {
     Denoising(SparsityBasis, ResidualTolerance),
 }
 
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct PixelwiseRecovery {
     pub geometry: Geometry,
     pub common_mode: CommonModeWeight,
@@ -105,7 +105,7 @@ impl PixelwiseRecovery {
         let origins: Vec<LightElement> = windows.iter().map(|window| window.0).collect();
         // Grey patterns drive all channels alike: one set of equations for all of them.
         for (plane, channels) in measurements.planes() {
-            let geometry = self.geometry;
+            let geometry = &self.geometry;
             let cache = GramCache::new(measurements, geometry, pattern_indices, plane, &origins);
             for (origin, pixels) in windows {
                 let mut samples_by_patterns = Vec::new();

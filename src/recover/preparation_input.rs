@@ -25,7 +25,9 @@ impl<'a, E> RecoveryPreparationInput<'a, E> {
     {
         RecoveryPreparationInput {
             measurements,
-            ..*self
+            geometry: self.geometry.clone(),
+            split: self.split,
+            executor: self.executor,
         }
     }
 }
@@ -42,7 +44,7 @@ pub(super) fn geometry(
         camera: measurements.camera,
         light: measurements.light,
         window,
-        correspondence: measurements.correspondence,
+        correspondence: measurements.correspondence.clone(),
         tile_side: Geometry::DEFAULT_TILE_SIDE,
     }
     .validate()?;

@@ -35,7 +35,7 @@ pub async fn find_response(
     let split = HoldoutSplit::new(&measurements.patterns);
     let preparation = RecoveryPreparationInput {
         measurements: &CalibratedMeasurements::uncorrected(measurements),
-        geometry,
+        geometry: geometry.clone(),
         split: &split,
         executor,
     };
@@ -43,7 +43,7 @@ pub async fn find_response(
     let mean = mean_function::smooth(&mean, window.side() as usize);
     Ok(photometry::find_response(
         measurements,
-        geometry,
+        &geometry,
         &mean,
         &split.all,
         executor,
@@ -102,7 +102,7 @@ impl PreparedRecovery {
         let split = HoldoutSplit::new(&measurements.patterns);
         let preparation = RecoveryPreparationInput {
             measurements: &CalibratedMeasurements::uncorrected(measurements),
-            geometry,
+            geometry: geometry.clone(),
             split: &split,
             executor,
         };
@@ -133,7 +133,7 @@ impl PreparedRecovery {
             }
         };
         let mut recovery = Self {
-            geometry,
+            geometry: geometry.clone(),
             split: split.clone(),
             photometry: photometry.clone(),
             solver,
@@ -237,7 +237,7 @@ impl PreparedRecovery {
         }
         let used = &self.split.all;
         let found =
-            photometry::find_response(measurements, self.geometry, mean_function, used, executor);
+            photometry::find_response(measurements, &self.geometry, mean_function, used, executor);
         Ok(found?)
     }
 

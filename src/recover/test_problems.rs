@@ -117,9 +117,7 @@ impl SyntheticCapture {
             camera: square(32),
             light: square(16),
             window: WINDOW,
-            correspondence: Correspondence {
-                affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
-            },
+            correspondence: Correspondence::from_affine([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]),
             tile_side: 32,
         };
         let weights: Vec<f64> = (0..25)
@@ -131,14 +129,14 @@ impl SyntheticCapture {
         let patterns = (0..patterns).map(|_| (0..area).map(|_| (next() + 0.5) as f32).collect());
         let patterns: Vec<Pattern> = patterns.map(Pattern::Grey).collect();
         let mut capture = Self {
-            geometry,
+            geometry: geometry.clone(),
             variation,
             brightness,
             function: weights.iter().map(|w| w / sum).collect(),
             measurements: Measurements {
                 camera: geometry.camera,
                 light: geometry.light,
-                correspondence: geometry.correspondence,
+                correspondence: geometry.correspondence.clone(),
                 full_scale: vec![1.0; patterns.len()],
                 patterns,
                 rows: CameraRowSet::all(geometry.camera.height),

@@ -9,6 +9,7 @@
 //! memory. This module uses no threads, files or clock; callers compute [`SimulatedScene::tile`] in parallel.
 
 mod camera;
+mod camera_view;
 mod cookies;
 mod emission_matrix;
 mod gradient_noise;
@@ -24,6 +25,7 @@ mod truth_lights;
 mod vec2;
 
 pub use camera::{Camera, RandomStreamId};
+pub use camera_view::CameraView;
 pub use emission_matrix::EmissionMatrix;
 pub use pattern_image::{GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, emission};
 pub use scene_kind::SceneKind;

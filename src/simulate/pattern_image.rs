@@ -115,6 +115,12 @@ impl GrayCodePattern {
         }
     }
 
+    /// Whether column or row `n` is bright.
+    pub fn is_lit(self, n: u32) -> bool {
+        let is_set = (n ^ (n >> 1)) >> self.bit & 1 == 1;
+        is_set != self.inverted
+    }
+
     /// The codes of the pattern.
     pub fn codes(self, light: Extent) -> PatternImage {
         let code = |(u, v): (u32, u32)| {
@@ -122,8 +128,7 @@ impl GrayCodePattern {
                 LightPlaneAxis::X => u,
                 LightPlaneAxis::Y => v,
             };
-            let on = (n ^ (n >> 1)) >> self.bit & 1 == 1;
-            if on != self.inverted { 255 } else { 0 }
+            if self.is_lit(n) { 255 } else { 0 }
         };
         PatternImage::Grey(light.cells().map(code).collect())
     }

@@ -1,5 +1,6 @@
 //! The built-in scenes by name.
 
+use super::camera_view::CameraView;
 use super::cookies::CookiesScene;
 use super::pattern_image::PatternEnsemble;
 use super::simulated_scene::{SimulatedScene, scene_geometry};
@@ -29,11 +30,24 @@ impl SceneKind {
         camera: Extent,
         light: Extent,
     ) -> Result<Box<dyn SimulatedScene>, GeometryError> {
-        let geometry = scene_geometry(camera, light)?;
+        let geometry = scene_geometry(camera, light, CameraView::default())?;
         Ok(match self {
             Self::StainedGlass => Box::new(StainedGlassScene::new(geometry)),
             Self::Cookies => Box::new(CookiesScene::new(geometry)),
         })
+    }
+
+    /// The rose window, seen as `view` lets see it. Cookies are seen straight only.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_stained_glass(
+        camera: Extent,
+        light: Extent,
+        view: CameraView,
+    ) -> Result<Box<dyn SimulatedScene>, GeometryError> {
+        let geometry = scene_geometry(camera, light, view)?;
+        Ok(Box::new(StainedGlassScene::new(geometry)))
     }
 
     /// The default ensemble: Gaussian for glass, as in the paper; Bernoulli for cookies, as its higher

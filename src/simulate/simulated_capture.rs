@@ -47,7 +47,7 @@ impl SimulatedCapture<'_> {
         let mut measurements = Measurements {
             camera: geometry.camera,
             light: geometry.light,
-            correspondence: geometry.correspondence,
+            correspondence: geometry.correspondence.clone(),
             patterns: codes.iter().map(emitted_pattern).collect(),
             full_scale: vec![1.0; count],
             rows: CameraRowSet::all(geometry.camera.height),
@@ -169,6 +169,7 @@ pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
         rows: measurements.rows.clone(),
         photos: measurements.photos[..count].to_vec(),
         flood: measurements.flood.clone(),
+        correspondence: measurements.correspondence.clone(),
         ..*measurements
     };
     first.noise = NoiseModel::with_gain_from(&first);

@@ -1,8 +1,9 @@
 //! The interface of simulated scenes, and their geometry.
 
+use super::camera_view::CameraView;
 use crate::transport::{
-    CHANNELS, CameraPixel, Correspondence, Extent, Geometry, GeometryError, TileRect,
-    TileTransportFunctions, Window,
+    CHANNELS, CameraPixel, Extent, Geometry, GeometryError, TileRect, TileTransportFunctions,
+    Window,
 };
 
 /// Side of the window that holds every built-in scene's band, in light elements.
@@ -28,21 +29,20 @@ pub trait SimulatedScene: Sync {
     }
 }
 
-/// The geometry of a scene: the light plane fills the camera's picture.
+/// The geometry of a scene: the light plane fills the camera's picture, as `view` lets see it.
 ///
 /// # Errors
 /// [`GeometryError`] for extents of zero, too large, or smaller than the window.
-pub(super) fn scene_geometry(camera: Extent, light: Extent) -> Result<Geometry, GeometryError> {
+pub(super) fn scene_geometry(
+    camera: Extent,
+    light: Extent,
+    view: CameraView,
+) -> Result<Geometry, GeometryError> {
     Geometry {
         camera,
         light,
         window: Window::new(WINDOW_SIDE)?,
-        correspondence: Correspondence {
-            affine: [
-                [f64::from(light.width) / f64::from(camera.width), 0.0, 0.0],
-                [0.0, f64::from(light.height) / f64::from(camera.height), 0.0],
-            ],
-        },
+        correspondence: view.correspondence(camera, light)?,
         tile_side: Geometry::DEFAULT_TILE_SIDE,
     }
     .validate()

@@ -67,14 +67,14 @@ pub(super) fn measure_accuracy(
     let preparation = PreparedRecovery::prepare(measurements, settings, executor);
     let recovery = pollster::block_on(preparation)?;
     let prepared = start.elapsed().as_secs_f64();
-    let geometry = *recovery.geometry();
-    let rects = sample_for(method, &geometry, pixels);
+    let geometry = recovery.geometry();
+    let rects = sample_for(method, geometry, pixels);
     let functions = executor.map(rects.len(), |i| {
         let tile = recovery.tile(measurements, rects[i]);
-        tile.functions(&geometry, recovery.basis())
+        tile.functions(geometry, recovery.basis())
     });
     let recovered = start.elapsed().as_secs_f64();
-    let error = |i: usize| transport_error(known, &geometry, &functions[i]);
+    let error = |i: usize| transport_error(known, geometry, &functions[i]);
     let errors = executor.map(functions.len(), error);
     let pixels = pixel_sampling::count_pixels(&rects);
     let all = geometry.camera.area();

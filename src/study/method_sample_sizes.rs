@@ -54,7 +54,7 @@ pub(super) fn sample_for(method: Method, geometry: &Geometry, pixels: usize) -> 
     };
     let tiles = Geometry {
         tile_side,
-        ..*geometry
+        ..geometry.clone()
     };
     pixel_sampling::random_tiles(&tiles, pixels, min_tiles)
 }

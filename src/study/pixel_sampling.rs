@@ -48,9 +48,7 @@ mod tests {
             camera,
             light: camera,
             window: Window::new(1).unwrap(),
-            correspondence: Correspondence {
-                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            },
+            correspondence: Correspondence::from_affine([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
             tile_side: 2,
         };
         let all = random_tiles(&geometry, usize::MAX, 1);

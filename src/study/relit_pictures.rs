@@ -156,7 +156,7 @@ fn pictures(
     };
     let preparation = PreparedRecovery::prepare(measurements, settings, executor);
     let recovery = pollster::block_on(preparation)?;
-    let geometry = *recovery.geometry();
+    let geometry = recovery.geometry();
     let basis = recovery.basis().cloned().unwrap_or_default();
     let area = geometry.window.area();
     let rects: Vec<_> = geometry.tiles().collect();
@@ -164,7 +164,7 @@ fn pictures(
     let tiles = executor.map(rects.len(), |i| {
         let tile = recovery.tile(measurements, rects[i]);
         // Quantised as in a file.
-        let functions = Tile::quantise(&tile, basis.rank()).functions(&geometry, &basis);
+        let functions = Tile::quantise(&tile, basis.rank()).functions(geometry, &basis);
         let pictures = lights.iter().map(|light| {
             let truth = match &light.photographed {
                 Some(picture) => {
@@ -175,7 +175,7 @@ fn pictures(
             };
             let relit = functions.tau.chunks_exact(area).zip(rects[i].pixels());
             let relit = relit.map(|(tau, pixel)| {
-                relight_pixel(&geometry, geometry.window_origin(pixel), tau, &light.light)
+                relight_pixel(geometry, geometry.window_origin(pixel), tau, &light.light)
             });
             (truth, relit.collect())
         });

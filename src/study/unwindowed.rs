@@ -112,9 +112,7 @@ mod tests {
         let measurements = Measurements {
             camera: Extent::new(1, 1),
             light: Extent::new(4, 4),
-            correspondence: Correspondence {
-                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            },
+            correspondence: Correspondence::from_affine([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
             full_scale: vec![1.0; 10],
             rows: CameraRowSet::all(1),
             photos: patterns.iter().map(seen).collect(),

@@ -187,9 +187,7 @@ mod tests {
             camera: extent(21, 11),
             light: extent(9, 5),
             window: Window::new(7).unwrap(),
-            correspondence: Correspondence {
-                affine: [[0.5, 0.02, -0.7], [-0.03, 0.5, 0.2]],
-            },
+            correspondence: Correspondence::from_affine([[0.5, 0.02, -0.7], [-0.03, 0.5, 0.2]]),
             tile_side: 8,
         };
         let (rank, area) = (5, 49);
@@ -233,9 +231,7 @@ mod tests {
             camera: extent(40, 30),
             light: extent(40, 30),
             window: Window::new(3).unwrap(),
-            correspondence: Correspondence {
-                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            },
+            correspondence: Correspondence::from_affine([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
             tile_side: 32,
         };
         let rect = |x, y, width, height| TileRect {
@@ -306,9 +302,7 @@ mod tests {
             camera: extent(512),
             light: extent(256),
             window: Window::new(15).unwrap(),
-            correspondence: Correspondence {
-                affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
-            },
+            correspondence: Correspondence::from_affine([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]),
             tile_side: 32,
         };
         let basis = Basis {

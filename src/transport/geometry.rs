@@ -8,6 +8,8 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::correspondence::Correspondence;
+
 /// Camera channels: red, green, blue.
 pub const CHANNELS: usize = 3;
 /// Maximum side of the camera grid and the light plane; products of sides and channels fit in `u64`.
@@ -87,29 +89,6 @@ impl LightElement {
     }
 }
 
-/// The affine map from camera positions to the light plane positions behind them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Correspondence {
-    /// `u = a·(x+½, y+½, 1)` in row 0, `v` likewise in row 1.
-    pub affine: [[f64; 3]; 2],
-}
-
-impl Correspondence {
-    /// Light plane position behind the centre of a camera pixel.
-    pub fn at(&self, pixel: CameraPixel) -> LightPosition {
-        self.map(f64::from(pixel.x) + 0.5, f64::from(pixel.y) + 0.5)
-    }
-
-    /// Light plane position behind a camera position.
-    pub fn map(&self, x: f64, y: f64) -> LightPosition {
-        let row = |[a, b, c]: [f64; 3]| a * x + b * y + c;
-        LightPosition {
-            u: row(self.affine[0]),
-            v: row(self.affine[1]),
-        }
-    }
-}
-
 /// A square window of `side x side` light elements, side odd.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Window {
@@ -179,6 +158,16 @@ pub struct TileRect {
 }
 
 impl TileRect {
+    /// Tile number `index`, in row-major order, of `grid` tiles of side `side` over the camera grid.
+    fn new(index: usize, grid: Extent, camera: Extent, side: u32) -> Self {
+        let [x, y] = [index as u32 % grid.width, index as u32 / grid.width].map(|at| at * side);
+        Self {
+            x,
+            y,
+            extent: Extent::new(side.min(camera.width - x), side.min(camera.height - y)),
+        }
+    }
+
     /// The pixels, row by row.
     pub fn pixels(self) -> impl Iterator<Item = CameraPixel> {
         let TileRect { x, y, extent } = self;
@@ -188,7 +177,7 @@ impl TileRect {
 }
 
 /// The grids, windows and tiles of a transport; everything except its values.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Geometry {
     /// The camera grid, `N` pixels.
     pub camera: Extent,
@@ -211,7 +200,7 @@ impl Geometry {
     ///
     /// # Errors
     /// If a field is out of range; the error names it.
-    pub fn validate(self) -> Result<Self, GeometryError> {
+    pub fn check(&self) -> Result<(), GeometryError> {
         let names = [
             "camera width",
             "camera height",
@@ -226,11 +215,28 @@ impl Geometry {
         if !(8..=256).contains(&self.tile_side) {
             return Err(GeometryError::TileSide(self.tile_side));
         }
-        let affine = self.correspondence.affine.as_flattened();
-        match affine.iter().all(|a| a.is_finite()) {
-            true => Ok(self),
-            false => Err(GeometryError::Correspondence),
+        let Correspondence {
+            affine,
+            displacement,
+        } = &self.correspondence;
+        if !affine.as_flattened().iter().all(|a| a.is_finite()) {
+            return Err(GeometryError::Correspondence);
         }
+        match displacement
+            .as_ref()
+            .is_none_or(|grid| grid.fits(self.camera))
+        {
+            true => Ok(()),
+            false => Err(GeometryError::Displacement),
+        }
+    }
+
+    /// This geometry, [checked](Self::check).
+    ///
+    /// # Errors
+    /// If a field is out of range; the error names it.
+    pub fn validate(self) -> Result<Self, GeometryError> {
+        self.check().map(|()| self)
     }
 
     /// Width and height of the camera grid and of the light plane, and the sides of a window and of a tile.
@@ -239,7 +245,7 @@ impl Geometry {
         [camera, light, [self.window.side, self.tile_side]]
     }
 
-    /// The geometry with these [`sides`](Self::sides), [checked](Self::validate).
+    /// The geometry with these [`sides`](Self::sides), [checked](Self::check).
     ///
     /// # Errors
     /// If a field is out of range; the error names it.
@@ -268,22 +274,14 @@ impl Geometry {
 
     /// The tiles, row by row.
     pub fn tiles(&self) -> impl ExactSizeIterator<Item = TileRect> + use<> {
-        let geometry = *self;
-        (0..self.tile_grid().area()).map(move |i| geometry.tile(i))
+        let (camera, tile_side) = (self.camera, self.tile_side);
+        let grid = self.tile_grid();
+        (0..grid.area()).map(move |i| TileRect::new(i, grid, camera, tile_side))
     }
 
     /// Tile number `index` in row-major order.
     pub fn tile(&self, index: usize) -> TileRect {
-        let across = self.tile_grid().width;
-        let [x, y] = [index as u32 % across, index as u32 / across].map(|at| at * self.tile_side);
-        TileRect {
-            x,
-            y,
-            extent: Extent::new(
-                self.tile_side.min(self.camera.width - x),
-                self.tile_side.min(self.camera.height - y),
-            ),
-        }
+        TileRect::new(index, self.tile_grid(), self.camera, self.tile_side)
     }
 
     /// Window origin of a pixel.
@@ -396,6 +394,11 @@ pub enum GeometryError {
     /// A coefficient is infinite or NaN.
     #[error("the correspondence has a coefficient that is not a finite number")]
     Correspondence,
+    /// The displacements are not those of a regular grid over the camera's pixels.
+    #[error(
+        "the displacement of the correspondence is not a grid of control points over the picture"
+    )]
+    Displacement,
 }
 
 #[cfg(test)]

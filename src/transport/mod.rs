@@ -8,6 +8,12 @@
 //! values of a tile as real numbers ([`FloatTile`]) and as codes ([`Tile`]), the distance of two transports
 //! ([`SnrAccumulator`]), and their singular values ([`SingularValueAnalysis`]).
 
+mod correspondence;
+#[cfg_attr(
+    all(target_arch = "wasm32", feature = "recovery", not(feature = "drawing")),
+    path = "no_displacement.rs"
+)]
+mod displacement_grid;
 mod float_tile;
 mod function_codes;
 mod geometry;
@@ -17,13 +23,15 @@ mod singular_values;
 mod snr;
 mod tile;
 
+pub use correspondence::Correspondence;
+pub use displacement_grid::{DisplacementGrid, SharedGrid};
 pub use float_tile::{Basis, FloatTile, TileTransportFunctions};
 pub(crate) use function_codes::end_pixel;
 pub use function_codes::{FunctionCodes, FunctionEntry, entries_by_pixel, entry_slot};
 pub(crate) use geometry::ClippedRect;
 pub use geometry::{
-    CHANNELS, CameraPixel, Correspondence, Extent, Geometry, GeometryError, LightElement,
-    LightPosition, MAX_SIDE, MAX_WINDOW, TileRect, Window,
+    CHANNELS, CameraPixel, Extent, Geometry, GeometryError, LightElement, LightPosition, MAX_SIDE,
+    MAX_WINDOW, TileRect, Window,
 };
 pub use known_transport::{KnownTransport, transport_error};
 pub(crate) use quantisation::ChannelPeaks;

@@ -105,15 +105,13 @@ mod tests {
                 camera: Extent::new(9, 8),
                 light,
                 window: Window::new(3).unwrap(),
-                correspondence: Correspondence {
-                    affine: [
-                        [f64::from(light.width) / 9.0, 0.0, -0.3],
-                        [0.1, f64::from(light.height) / 8.0, 0.0],
-                    ],
-                },
+                correspondence: Correspondence::from_affine([
+                    [f64::from(light.width) / 9.0, 0.0, -0.3],
+                    [0.1, f64::from(light.height) / 8.0, 0.0],
+                ]),
                 tile_side: 8,
             };
-            let mut analysis = SingularValueAnalysis::new(geometry);
+            let mut analysis = SingularValueAnalysis::new(geometry.clone());
             let block = analysis.block();
             let left = (light.width as usize - block.width as usize) / 2;
             // `[m, 3N]`

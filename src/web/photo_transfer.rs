@@ -25,8 +25,7 @@ pub fn corrupt() -> CodedError {
 #[cfg(any(feature = "decoder", feature = "recovery"))]
 pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
     let sides = geometry.sides().into_iter().flatten().map(f64::from);
-    let affine = geometry.correspondence.affine.into_iter().flatten();
-    sides.chain(affine).collect()
+    sides.chain(geometry.correspondence.to_numbers()).collect()
 }
 
 /// The bytes of a tile.
@@ -46,12 +45,10 @@ pub fn pack_tile(tile: &Tile) -> Vec<u8> {
 /// [`corrupt`] if the values describe no transport.
 #[cfg(feature = "drawing")]
 pub fn unpack_transport(geometry: &[f64], basis: &[f32]) -> Result<Transport, CodedError> {
-    let (sides, affine) = geometry.split_first_chunk::<6>().ok_or_else(corrupt)?;
-    let (&[u, v], []) = affine.as_chunks() else {
-        return Err(corrupt());
-    };
-    let (sides, affine) = (bytemuck::cast(sides.map(|side| side as u32)), [u, v]);
-    let geometry = Geometry::from_sides(sides, Correspondence { affine });
+    let (sides, correspondence) = geometry.split_first_chunk::<6>().ok_or_else(corrupt)?;
+    let correspondence = Correspondence::from_numbers(correspondence).ok_or_else(corrupt)?;
+    let sides = bytemuck::cast(sides.map(|side| side as u32));
+    let geometry = Geometry::from_sides(sides, correspondence);
     let geometry = geometry.map_err(|_| corrupt())?;
     let functions = basis.chunks_exact(geometry.window.area());
     if !functions.remainder().is_empty() {

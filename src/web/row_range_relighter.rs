@@ -55,8 +55,8 @@ impl RowRangeRelighter {
         quality: f64,
         out: &Uint8Array,
     ) -> Result<(), CodedError> {
-        let geometry = self.relighter.transport().geometry;
-        let width = geometry.camera.width;
+        let geometry = &self.relighter.transport().geometry;
+        let (width, light_width) = (geometry.camera.width, geometry.light.width);
         if u64::from(out.length()) != 4 * self.rows.len() as u64 * u64::from(width) {
             return Err(CodedError::internal(
                 "the output has not the row range's length",
@@ -65,7 +65,7 @@ impl RowRangeRelighter {
         self.relighter.set_quality(quality as f32);
         if let Some(values) = light {
             let light_rows = self.relighter.light_rows();
-            let mut rgb = vec![[0.0; CHANNELS]; geometry.light.width as usize];
+            let mut rgb = vec![[0.0; CHANNELS]; light_width as usize];
             let length = rgb.as_flattened().len() as u32;
             if u64::from(values.length()) != u64::from(length) * light_rows.len() as u64 {
                 return Err(CodedError::internal(

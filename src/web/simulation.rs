@@ -24,7 +24,7 @@ struct TabulatedScene {
 
 impl TabulatedScene {
     fn new(scene: &dyn SimulatedScene, executor: &impl Executor) -> Self {
-        let geometry = *scene.geometry();
+        let geometry = scene.geometry().clone();
         let tiles: Vec<_> = geometry.tiles().collect();
         let computed = executor.map(tiles.len(), |i| scene.tile(tiles[i]));
         let area = geometry.window.area();
@@ -298,14 +298,12 @@ impl TransportAnalysis {
             camera: Extent::new(width, height),
             light: Extent::new(light_width, light_height),
             window: Window::new(1).map_err(unsuitable)?,
-            correspondence: crate::transport::Correspondence {
-                affine: [[a, b, c], [d, e, f]],
-            },
+            correspondence: crate::transport::Correspondence::from_affine([[a, b, c], [d, e, f]]),
             tile_side: Geometry::DEFAULT_TILE_SIDE,
         };
         let geometry = with_window(&base, window)?;
         Ok(Self {
-            geometry,
+            geometry: geometry.clone(),
             singular_values: SingularValueAnalysis::new(geometry),
             cells,
             band: vec![0.0; (cells * cells) as usize],
@@ -370,7 +368,7 @@ impl TransportAnalysis {
 fn with_window(geometry: &Geometry, window: u32) -> Result<Geometry, CodedError> {
     let geometry = Geometry {
         window: Window::new(window).map_err(unsuitable)?,
-        ..*geometry
+        ..geometry.clone()
     };
     geometry.validate().map_err(unsuitable)
 }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use relightable_photo::format::HEADER_BYTES;
 use relightable_photo::transport::{
-    Correspondence, Extent, Geometry, TileTransportFunctions, Window,
+    Correspondence, DisplacementGrid, Extent, Geometry, TileTransportFunctions, Window,
 };
 
 /// A reproducible stream of numbers in 0..1.
@@ -43,11 +43,28 @@ pub fn tiled(
         camera: extent(camera),
         light: extent(light),
         window: Window::new(window).unwrap(),
-        correspondence: Correspondence { affine },
+        correspondence: Correspondence::from_affine(affine),
         tile_side,
     }
     .validate()
     .unwrap()
+}
+
+/// The geometry with a correspondence that bends along both axes, by up to a few elements.
+#[allow(dead_code)] // not in every test
+pub fn bent(mut geometry: Geometry) -> Geometry {
+    let points = DisplacementGrid::points_over(geometry.camera, 8);
+    let code = |(i, j): (u32, u32)| {
+        let (i, j) = (i as i16, j as i16);
+        [
+            40 * (i % 5) * (i % 3) - 97 * (j % 4),
+            300 - 150 * (i % 4) * (j % 3),
+        ]
+    };
+    let codes = points.cells().map(code).collect();
+    let grid = DisplacementGrid::new(8, 0.011, points, codes).unwrap();
+    geometry.correspondence.displacement = Some(grid.into());
+    geometry.validate().unwrap()
 }
 
 /// Noisy light transport functions, zero off the light plane; the first tile is dark.

@@ -11,7 +11,9 @@ use image::ExtendedColorType;
 use rayon::prelude::*;
 use tempfile::TempDir;
 
-use self::photograph_file::{DevelopSettings, DevelopedPhotograph, develop};
+use self::photograph_file::DevelopedPhotograph;
+pub use self::photograph_file::{DevelopSettings, SampleKind, develop};
+pub use self::photograph_list::photographs;
 use super::advice::error_with_remedy;
 use super::capture_writer::write_png;
 use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
@@ -20,6 +22,7 @@ use super::value_parsers::UsageError;
 use crate::acquisition::{
     PairingFault, PatternSequence, PictureRole, SEQUENCE_NAME, SequenceBrightness,
 };
+use crate::calibrate::GrayCodeFit;
 use crate::capture::{
     CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME, Manifest, ManifestCamera,
 };
@@ -29,7 +32,7 @@ use crate::transport::{Extent, TileRect};
 /// Folders that photographs are written into.
 const FOLDERS: [&str; 2] = ["photos", "graycode"];
 /// Photographs that are in memory at once.
-const MAX_READERS: usize = 4;
+pub const MAX_READERS: usize = 4;
 /// Rows of the Gray code that are decoded, at most.
 const GRAY_CODE_ROWS: u32 = 64;
 /// Most faults that are listed.
@@ -55,6 +58,16 @@ pub struct AssembleArgs {
     /// files, or linear PNG, TIFF or OpenEXR
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     photos: Vec<PathBuf>,
+    #[command(flatten)]
+    develop: DevelopArgs,
+    /// Write the capture although photographs seem not to show their pictures
+    #[arg(long)]
+    force: bool,
+}
+
+/// How photographs become linear measurements.
+#[derive(Debug, Args)]
+pub struct DevelopArgs {
     /// Tone curve of the photographs: linear, srgb, or gamma=2.2; must be given for 8 bits [default: linear]
     #[arg(long, value_name = "CURVE", value_parser = parse_response)]
     response: Option<CameraResponse>,
@@ -71,9 +84,26 @@ pub struct AssembleArgs {
     /// Keep a part of the picture, in pixels before averaging
     #[arg(long, value_name = "X,Y,WxH", value_parser = parse_rect)]
     crop: Option<TileRect>,
-    /// Write the capture although photographs seem not to show their pictures
-    #[arg(long)]
-    force: bool,
+}
+
+impl DevelopArgs {
+    /// The settings.
+    ///
+    /// # Errors
+    /// [`UsageError`] if white is not above black.
+    pub fn settings(&self) -> Result<DevelopSettings> {
+        let black = self.black.unwrap_or(0.0);
+        if self.white.is_some_and(|white| white <= black) {
+            bail!(UsageError("--white must be above --black"));
+        }
+        Ok(DevelopSettings {
+            response: self.response,
+            black: self.black,
+            white: self.white,
+            bin: self.bin,
+            crop: self.crop,
+        })
+    }
 }
 
 fn parse_response(text: &str) -> Result<CameraResponse, String> {
@@ -115,26 +145,14 @@ fn parse_rect(text: &str) -> Result<TileRect, String> {
 }
 
 pub fn run(args: &AssembleArgs) -> Result<()> {
-    if args
-        .white
-        .is_some_and(|white| white <= args.black.unwrap_or(0.0))
-    {
-        bail!(UsageError("--white must be above --black"));
-    }
+    let settings = args.develop.settings()?;
     let sequence = read_sequence(&args.folder)?;
     ensure_new(&args.folder)?;
-    let paths = photograph_list::photographs(&args.photos)?;
+    let paths = photographs(&args.photos)?;
     // One may be found; for more there is no need to read them.
     if paths.len().abs_diff(sequence.pictures.len()) > 1 {
         bail!(wrong_count(paths.len(), sequence.pictures.len(), ""));
     }
-    let settings = DevelopSettings {
-        response: args.response,
-        black: args.black,
-        white: args.white,
-        bin: args.bin,
-        crop: args.crop,
-    };
     let session = Session::develop(&args.folder, sequence, paths, &settings)?;
     let faults = session.check_pairing(args.force)?;
     faults
@@ -151,8 +169,8 @@ pub fn run(args: &AssembleArgs) -> Result<()> {
         manifest.shots.len(),
         session.camera.extent()
     );
-    match check_gray_code(&args.folder) {
-        Ok(()) => eprintln!("{summary}; `ltm-export recover` takes this folder"),
+    match fit_gray_code(&args.folder) {
+        Ok(_) => eprintln!("{summary}; `ltm-export recover` takes this folder"),
         Err(error) => {
             eprintln!("warning: {}", error_with_remedy(&error));
             eprintln!(
@@ -485,8 +503,8 @@ fn wrong_count(photos: usize, pictures: usize, place: &str) -> String {
     )
 }
 
-/// Decodes some rows of the Gray code.
-fn check_gray_code(folder: &Path) -> Result<()> {
+/// Decodes some rows of the Gray code of a capture folder.
+pub fn fit_gray_code(folder: &Path) -> Result<GrayCodeFit> {
     let folder = CaptureFolder::open(folder)?;
     let _spinner = progress::spinner("decoding");
     let dark = folder.read_dark()?;
@@ -496,10 +514,8 @@ fn check_gray_code(folder: &Path) -> Result<()> {
     let rows = (0..count).map(|i| row(i)..row(i) + 1);
     let rows = CameraRowSet::from_strips(rows);
     let gray_code = folder.read_gray_code(&dark, &rows)?;
-    let decoded = gray_code.correspondence(camera);
-    decoded
-        .map(|_| ())
-        .with_context(|| folder.manifest_path().display().to_string())
+    let fit = gray_code.fit(camera);
+    fit.with_context(|| folder.manifest_path().display().to_string())
 }
 
 /// For instance "a", or "a to b".

@@ -382,7 +382,8 @@ pub fn capture_fault(
                 true if symmetry.is_transposed => "turned by 90 degrees",
                 _ => "mirrored",
             };
-            let right = symmetry.of_correspondence(measurements.light, measurements.correspondence);
+            let right =
+                symmetry.of_correspondence(measurements.light, &measurements.correspondence);
             // Without negative zeros.
             let [u, v] = right.affine.map(|row| row.map(|value| value + 0.0));
             format!(

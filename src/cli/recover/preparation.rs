@@ -13,7 +13,7 @@ use crate::export::{self, MIN_PLAUSIBLE_SNR, PreparedExport};
 use crate::recover::{
     CaptureFault, PreparedRecovery, RecoverError, WindowSizeEstimate, diagnose, find_response,
 };
-use crate::transport::{Correspondence, Decibels, Window};
+use crate::transport::{Decibels, Window};
 
 /// SNR on held-out patterns below which hardly anything in a file would be right.
 const MIN_USABLE_SNR: Decibels = Decibels(2.0);
@@ -204,8 +204,8 @@ impl CapturePreparation<'_> {
         let mut manifest = sample.folder.manifest().clone();
         if still.start > 0 {
             // Gray code and flood are from the place before.
-            let correspondence = sample.measurements.correspondence;
-            manifest.correspondence = Some(shifted(correspondence, shift.unwrap_or_default()));
+            let correspondence = &sample.measurements.correspondence;
+            manifest.correspondence = Some(correspondence.shifted(shift.unwrap_or_default()));
             manifest.flood = None;
         }
         let warning = messages::moved_once(&sample.folder, &sample.shots, (first, shift), &still);
@@ -396,14 +396,6 @@ fn first_after_step(shifts: &[[f64; 2]]) -> Option<usize> {
     is_step.then_some(first)
 }
 
-/// The correspondence of a picture that is shifted by camera pixels to the right and down.
-fn shifted(correspondence: Correspondence, [dx, dy]: [i32; 2]) -> Correspondence {
-    let row = |[x, y, constant]: [f64; 3]| [x, y, constant - x * f64::from(dx) - y * f64::from(dy)];
-    Correspondence {
-        affine: correspondence.affine.map(row),
-    }
-}
-
 /// Which of `count` photographs show the object from the place of most, if the camera moved before photograph `first`: of
 /// equal numbers those before, as the Gray code. `None` if these are too few.
 fn still_photographs(count: usize, first: usize) -> Option<std::ops::Range<usize>> {
@@ -423,7 +415,6 @@ fn partition(shots: &[usize], still: &std::ops::Range<usize>) -> (Vec<usize>, Ve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::transport::CameraPixel;
 
     #[test]
     fn a_step_of_shifts_is_found_and_trembling_is_none() {
@@ -446,17 +437,5 @@ mod tests {
         assert_eq!(still_photographs(72, 20), Some(20..72));
         assert_eq!(still_photographs(40, 20), None);
         assert_eq!(partition(&[3, 5, 7, 9], &(1..4)), (vec![3], vec![5, 7, 9]));
-    }
-
-    #[test]
-    fn a_correspondence_follows_the_picture() {
-        let affine = [[0.5, 0.1, 3.0], [-0.2, 0.4, 1.0]];
-        let before = Correspondence { affine };
-        let after = shifted(before, [3, 1]);
-        let (old, new) = (
-            before.at(CameraPixel { x: 10, y: 10 }),
-            after.at(CameraPixel { x: 13, y: 11 }),
-        );
-        assert!((old.u - new.u).abs() < 1e-12 && (old.v - new.v).abs() < 1e-12);
     }
 }

@@ -8,7 +8,7 @@
 //! ```
 
 pub(super) mod basis_chunk;
-mod byte_planes;
+pub(super) mod byte_planes;
 mod colour;
 mod dct;
 pub(super) mod direct_functions;

@@ -239,7 +239,7 @@ fn assemble(
     encode: impl Fn(FloatTile) -> Result<EncodedTile, FormatError> + Sync + Send,
 ) -> Result<EncodedFile, FormatError> {
     let (source, rotation) = (&analysed.source, analysed.rotation.as_ref());
-    let geometry = source.geometry;
+    let geometry = &source.geometry;
     let (tiles, area) = (geometry.tile_grid().area(), geometry.window.area());
     let mut chunks = vec![Vec::with_capacity(tiles); scans.len()];
     // Every prefix lacks the dropped components.
@@ -290,8 +290,13 @@ fn assemble(
         }
     }
     let extensions = source.extensions.clone();
-    let (index, index_bytes) =
-        FileIndex::encode(geometry, scans, entries, extensions, &source.metadata)?;
+    let (index, index_bytes) = FileIndex::encode(
+        geometry.clone(),
+        scans,
+        entries,
+        extensions,
+        &source.metadata,
+    )?;
     Ok(EncodedFile {
         index,
         index_bytes,

@@ -77,8 +77,8 @@ impl<'a, E: Executor> AnalysedSource<'a, E> {
     /// # Panics
     /// If a tile or a basis function has the wrong length.
     pub fn new(source: EncoderInput<'a>, executor: &'a E) -> Result<Self, FormatError> {
-        let geometry = source.geometry.validate();
-        geometry.map_err(FormatError::InvalidGeometry)?;
+        let geometry = &source.geometry;
+        geometry.check().map_err(FormatError::InvalidGeometry)?;
         let rank = source.basis.map_or(0, Basis::rank);
         if rank > usize::from(MAX_RANK) {
             return Err(FormatError::TooMany {

@@ -42,9 +42,7 @@ fn geometry() -> Geometry {
         camera: Extent::new(SIDE, SIDE),
         light: Extent::new(SIDE / 2, SIDE / 2),
         window: Window::new(WINDOW).unwrap(),
-        correspondence: Correspondence {
-            affine: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
-        },
+        correspondence: Correspondence::from_affine([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]),
         tile_side: 32,
     }
 }

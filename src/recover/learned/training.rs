@@ -96,7 +96,7 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
             self.executor.check_cancelled()?;
             let (functions, prior) = truncate_basis(&functions, &prior, &axes, rank);
             let model = LearnedModel {
-                geometry: self.geometry,
+                geometry: self.geometry.clone(),
                 basis: LearnedBasis::new(&functions, &mean),
                 penalty: NonNegativityPenalty::new(&functions, &mean),
                 prior,

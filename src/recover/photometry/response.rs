@@ -55,7 +55,7 @@ use ResponseHypothesis as Hypothesis;
 /// [`Cancelled`].
 pub(in crate::recover) fn find(
     measurements: &Measurements,
-    geometry: Geometry,
+    geometry: &Geometry,
     mean_function: &[f64],
     used: &[usize],
     executor: &impl Executor,
@@ -94,7 +94,7 @@ impl ResponseHypothesis {
 
 struct ResponseSearch<'a, E> {
     measurements: CalibratedMeasurements<'a>,
-    geometry: Geometry,
+    geometry: &'a Geometry,
     mean_function: &'a [f64],
     used: &'a [usize],
     squares: Vec<TileRect>,
@@ -215,7 +215,7 @@ impl<E: Executor> ResponseSearch<'_, E> {
     fn score(&self, hypothesis: Hypothesis) -> Scored {
         let scores = self.executor.map(self.squares.len(), |i| {
             let mut energies = [0.0; 2];
-            for_largest_window(&self.geometry, self.squares[i], |origin, pixels| {
+            for_largest_window(self.geometry, self.squares[i], |origin, pixels| {
                 vectorise(
                     #[cfg_attr(target_arch = "x86_64", inline(always))]
                     || self.add_window(&mut energies, hypothesis, origin, pixels),

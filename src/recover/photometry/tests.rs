@@ -24,7 +24,7 @@ fn photometry_of(capture: &SyntheticCapture) -> Photometry {
     let measurements = CalibratedMeasurements::uncorrected(&capture.measurements);
     let preparation = RecoveryPreparationInput {
         measurements: &measurements,
-        geometry: capture.geometry,
+        geometry: capture.geometry.clone(),
         split: &HoldoutSplit::new(&capture.measurements.patterns),
         executor: &SequentialExecutor,
     };

@@ -168,7 +168,7 @@ impl TextureLayout {
         let grid = geometry.tile_grid();
         let (width, height) = (grid.width, 2 * grid.height);
         Ok(Self {
-            geometry: *geometry,
+            geometry: geometry.clone(),
             quads,
             textures: [
                 array("coefficients", Rgba16Sint, camera, layers),

@@ -15,9 +15,7 @@ fn geometry(camera: (u32, u32), window: u32) -> Geometry {
         camera: Extent::new(camera.0, camera.1),
         light: Extent::new(20, 10),
         window: Window::new(window).unwrap(),
-        correspondence: Correspondence {
-            affine: [[0.12, 0.0, -0.75], [0.0, 0.06, 1.0]],
-        },
+        correspondence: Correspondence::from_affine([[0.12, 0.0, -0.75], [0.0, 0.06, 1.0]]),
         tile_side: 16,
     }
 }
@@ -80,7 +78,7 @@ fn each_code_is_where_the_shader_reads_it() {
         ((8, 1), 1, WEBGL2_MINIMUM),
     ] {
         let geometry = geometry(camera, window);
-        let transport = transport(geometry, 0);
+        let transport = transport(geometry.clone(), 0);
         let layout = TextureLayout::new(&transport, limits).unwrap();
         let TextureDescriptor { extent, layers, .. } = layout.textures[binding::CODES];
         let mut texture: Vec<[i16; 4]> = Vec::new();
@@ -158,7 +156,7 @@ fn photographs_without_functions_have_a_single_texel_for_them() {
 fn each_coefficient_is_where_the_shader_reads_it() {
     let geometry = geometry((37, 23), 3);
     for rank in [1, 4, 9, 16] {
-        let transport = transport(geometry, rank);
+        let transport = transport(geometry.clone(), rank);
         let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
         let (quads, pairs) = (rank.div_ceil(4) as u32, rank.div_ceil(8) as u32);
         assert_eq!(layout.quad_pairs(), pairs);
@@ -206,7 +204,7 @@ fn origins_far_off_the_light_plane_are_clamped() {
     for (shift, expected) in [(1e300, [20, 10]), (-1e300, [-15, -15])] {
         let mut geometry = geometry((8, 8), 15);
         geometry.correspondence.affine = [[0.0, 0.0, shift]; 2];
-        let transport = transport(geometry, 0);
+        let transport = transport(geometry.clone(), 0);
         let layout = TextureLayout::new(&transport, WEBGL2_MINIMUM).unwrap();
         for [u, v] in layout.origin_texels() {
             assert_eq!([u, v], expected);

@@ -129,9 +129,7 @@ mod tests {
             camera: extent,
             light: extent,
             window: Window::new(3).unwrap(),
-            correspondence: Correspondence {
-                affine: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            },
+            correspondence: Correspondence::from_affine([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
             tile_side: 8,
         };
         let transport = Transport {

@@ -218,7 +218,9 @@ mod tests {
     #[test]
     fn lead_is_nearly_black_and_glass_is_not() {
         let side = |n| Extent::new(n, n);
-        let scene = StainedGlassScene::new(scene_geometry(side(192), side(96)).unwrap());
+        let scene = StainedGlassScene::new(
+            scene_geometry(side(192), side(96), Default::default()).unwrap(),
+        );
         let geometry = scene.geometry();
         let plane = CentredCoordinates::new(geometry.light);
         let (mut lead, mut glass) = (0, 0);

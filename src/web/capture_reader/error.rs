@@ -26,6 +26,7 @@ impl From<CaptureError> for CodedError {
             | Kind::OutOfRange { .. }
             | Kind::InvalidResponse
             | Kind::NotInvertible
+            | Kind::DisplacementOfOtherPicture
             | Kind::InvalidTruth(_) => "capture-manifest",
         };
         let remedy = match &error.problem {

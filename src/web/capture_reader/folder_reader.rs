@@ -43,19 +43,25 @@ impl CaptureReader {
     /// for [`CaptureBuilder`](crate::web::CaptureBuilder) of the module of recovery.
     ///
     /// # Errors
-    /// Codes that begin with `capture-`; `recover-correspondence` if the Gray code is unclear; `recover-patterns` if
+    /// Codes that begin with `capture-`; `recover-correspondence` if the Gray code is unclear, or the
+    /// manifest has a correspondence that bends; `recover-patterns` if
     /// there are fewer shots; `recover-memory` if memory is missing.
     pub fn calibration(&self, count: Option<usize>) -> Result<Vec<u8>, CodedError> {
         let (folder, dark) = (&self.folder, &self.dark);
         let manifest = folder.manifest();
         let shots = select_shots(&manifest.shots, count)?;
         folder.open_flood(dark)?;
-        let correspondence = match manifest.correspondence {
-            Some(correspondence) => correspondence,
+        let correspondence = match &manifest.correspondence {
+            Some(correspondence) if correspondence.displacement.is_some() => {
+                let message = "capture.json: the correspondence bends, and pages recover with affine ones only; recover this \
+                               capture with ltm-export, or remove \"correspondence.displacement\"";
+                return Err(CodedError::new("recover-correspondence", message));
+            }
+            Some(correspondence) => correspondence.clone(),
             None => {
                 let rows = CameraRowSet::all(manifest.camera.height);
                 let photos = folder.read_gray_code(dark, &rows)?;
-                photos.correspondence(manifest.camera.extent())?
+                photos.fit_affine(manifest.camera.extent())?
             }
         };
         let patterns = shots.iter().map(|&i| folder.read_pattern(i));

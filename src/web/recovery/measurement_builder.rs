@@ -131,9 +131,7 @@ impl MeasurementBuilder {
         if !affine.iter().all(|x| x.is_finite()) || a * e - b * d == 0.0 {
             return Err(invalid());
         }
-        self.correspondence = Some(Correspondence {
-            affine: [[a, b, c], [d, e, f]],
-        });
+        self.correspondence = Some(Correspondence::from_affine([[a, b, c], [d, e, f]]));
         Ok(())
     }
 
@@ -219,7 +217,7 @@ impl MeasurementBuilder {
                 CodedError::new("recover-correspondence", message)
             })
         })?;
-        Ok(photos.correspondence(self.camera)?)
+        Ok(photos.fit_affine(self.camera)?)
     }
 
     /// A photograph in units of the measurement, less the dark one.

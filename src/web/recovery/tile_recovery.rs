@@ -29,7 +29,7 @@ impl TileRecovery {
         let measurements = Measurements {
             camera: geometry.camera,
             light: geometry.light,
-            correspondence: geometry.correspondence,
+            correspondence: geometry.correspondence.clone(),
             patterns,
             rows: CameraRowSet::from_strips([]),
             photos: vec![LinearPhoto::new(); full_scale.len()],

@@ -1,0 +1,252 @@
+//! `ltm-export calibrate`: the correspondence of a capture from its Gray code, reported and written into its manifest.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
+use serde::Serialize;
+use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
+use serde::ser::Serializer;
+use serde_json::value::RawValue;
+
+use super::output_file::{OutputFile, PNG, temporary_beside};
+use super::progress;
+use super::report::{print_json, print_line};
+use crate::calibrate::{GrayCodeFit, ResidualSummary};
+use crate::capture::{CameraRowSet, CaptureFolder, Manifest};
+use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
+
+/// Memory for the photographs of the Gray code, in bytes. Rows are left out of larger ones.
+const MAX_GRAY_CODE_BYTES: u64 = 1 << 30;
+
+/// Find the correspondence of a capture from its Gray code, report how well it fits, and write it into capture.json
+#[derive(Debug, Args)]
+pub struct CalibrateArgs {
+    /// Capture folder
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Draw the map: how far the correspondence bends from its affine part, along the display's columns in red and along
+    /// its rows in green
+    #[arg(long, value_name = "FILE.png")]
+    map: Option<PathBuf>,
+    /// Replace the correspondence that capture.json has
+    #[arg(long)]
+    force: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct CalibrationReport {
+    /// Share of the camera pixels that are decoded along both axes.
+    decoded: f64,
+    affine: [[f64; 3]; 2],
+    /// Largest displacement, in light elements; 0 if the correspondence is affine.
+    largest_displacement: f64,
+    /// Distances between the correspondence and decoded positions, in light elements.
+    residual: Option<Distances>,
+    /// Those of the affine map alone.
+    affine_residual: Option<Distances>,
+}
+
+#[derive(Serialize)]
+struct Distances {
+    median: f64,
+    percentile_95: f64,
+}
+
+impl From<ResidualSummary> for Distances {
+    fn from(summary: ResidualSummary) -> Self {
+        let ResidualSummary {
+            median,
+            percentile_95,
+        } = summary;
+        Self {
+            median,
+            percentile_95,
+        }
+    }
+}
+
+pub fn run(args: &CalibrateArgs) -> Result<()> {
+    let folder = CaptureFolder::open(&args.folder)?;
+    let (manifest, path) = (folder.manifest(), folder.manifest_path());
+    ensure!(
+        manifest.correspondence.is_none() || args.force,
+        "{}: has a \"correspondence\" already; --force replaces it",
+        path.display()
+    );
+    let spinner = progress::spinner("decoding Gray code");
+    let dark = folder.read_dark()?;
+    let camera = manifest.camera.extent();
+    let gray_code = folder.read_gray_code(&dark, &rows(manifest))?;
+    let fit = gray_code
+        .fit(camera)
+        .with_context(|| path.display().to_string())?;
+    drop(spinner);
+    if let Some(map) = &args.map {
+        draw_map(map, camera, &fit.correspondence)?;
+    }
+    write_correspondence(&path, &fit.correspondence)?;
+    let report = CalibrationReport {
+        decoded: fit.decoded,
+        affine: fit.correspondence.affine,
+        largest_displacement: largest_displacement(&fit.correspondence),
+        residual: fit.residual.map(Distances::from),
+        affine_residual: fit.affine_residual.map(Distances::from),
+    };
+    match args.json {
+        true => print_json(&report),
+        false => print(&fit, &report),
+    }
+}
+
+/// The rows of the Gray code that fit in memory, evenly spaced.
+fn rows(manifest: &Manifest) -> CameraRowSet {
+    let Extent { width, height } = manifest.camera.extent();
+    let row_bytes = u64::from(width) * (CHANNELS * size_of::<f32>()) as u64;
+    let photographs = manifest.graycode.len().max(1) as u64;
+    let count = (MAX_GRAY_CODE_BYTES / (row_bytes * photographs)).clamp(1, height.into());
+    let row = |i: u64| (i * u64::from(height) / count) as u32;
+    CameraRowSet::from_strips((0..count).map(|i| row(i)..row(i) + 1))
+}
+
+fn print(fit: &GrayCodeFit, report: &CalibrationReport) -> Result<()> {
+    let line = |name: &str, value: &str| print_line(&format!("{name:15} {value}"));
+    let decoded = format!("{:.0} % of the camera pixels", 100.0 * report.decoded);
+    line("decoded", &decoded)?;
+    let shape = match fit.correspondence.displacement {
+        None => "affine".to_owned(),
+        Some(_) => format!(
+            "bends, by up to {:.1} light elements from an affine map",
+            report.largest_displacement
+        ),
+    };
+    line("correspondence", &shape)?;
+    let distances = |distances: &Option<Distances>| match distances {
+        None => "unknown: no pixel is decoded to a single light element".to_owned(),
+        Some(Distances {
+            median,
+            percentile_95,
+        }) => {
+            format!("median {median:.2}, 95 % below {percentile_95:.2} light elements")
+        }
+    };
+    line("residual", &distances(&report.residual))?;
+    if fit.correspondence.displacement.is_some() {
+        line("affine alone", &distances(&report.affine_residual))?;
+    }
+    Ok(())
+}
+
+/// Largest displacement at a control point, in light elements.
+fn largest_displacement(correspondence: &Correspondence) -> f64 {
+    let grid = correspondence.displacement.as_ref();
+    grid.map_or(0.0, |grid| grid.largest())
+}
+
+/// Draws the displacement of every camera pixel, grey where there is none.
+fn draw_map(path: &Path, camera: Extent, correspondence: &Correspondence) -> Result<()> {
+    let affine = Correspondence::from_affine(correspondence.affine);
+    let largest = largest_displacement(correspondence).max(f64::MIN_POSITIVE);
+    let code = |d: f64| (127.5 + 127.5 * d / largest).round() as u8;
+    let pixels = camera.cells().map(|(x, y)| {
+        let pixel = CameraPixel { x, y };
+        let (bent, straight) = (correspondence.at(pixel), affine.at(pixel));
+        [code(bent.u - straight.u), code(bent.v - straight.v), 128]
+    });
+    let pixels: Vec<[u8; CHANNELS]> = pixels.collect();
+    let output = OutputFile::create(path, &PNG)?;
+    output.finish(|out| {
+        PngEncoder::new(out)
+            .write_image(
+                pixels.as_flattened(),
+                camera.width,
+                camera.height,
+                ExtendedColorType::Rgb8,
+            )
+            .context("cannot be encoded")
+    })?;
+    Ok(())
+}
+
+/// The fields of a JSON object in their order, with their texts.
+struct ObjectText(Vec<(String, Box<RawValue>)>);
+
+impl<'de> Deserialize<'de> for ObjectText {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Fields;
+        impl<'de> Visitor<'de> for Fields {
+            type Value = ObjectText;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<ObjectText, A::Error> {
+                let mut fields = Vec::new();
+                while let Some(field) = map.next_entry()? {
+                    fields.push(field);
+                }
+                Ok(ObjectText(fields))
+            }
+        }
+        deserializer.deserialize_map(Fields)
+    }
+}
+
+impl Serialize for ObjectText {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, text)| (name, text)))
+    }
+}
+
+/// Sets "correspondence" in the manifest at `path`, and keeps the text of all other fields.
+fn write_correspondence(path: &Path, correspondence: &Correspondence) -> Result<()> {
+    let write = || -> Result<()> {
+        let json = std::fs::read_to_string(path)?;
+        let mut manifest: ObjectText = serde_json::from_str(&json)?;
+        manifest.0.retain(|(name, _)| name != "correspondence");
+        let text = RawValue::from_string(serde_json::to_string(correspondence)?)?;
+        manifest.0.push(("correspondence".to_owned(), text));
+        let json = serde_json::to_string_pretty(&manifest)?;
+        let (builder, parent) = temporary_beside(path, 0o666);
+        let file = builder.tempfile_in(parent)?;
+        std::fs::write(file.path(), json + "\n")?;
+        file.persist(path)?;
+        Ok(())
+    };
+    write().with_context(|| path.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_fields_of_the_manifest_keep_their_text() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("capture.json");
+        let shots = "[{\"pattern\":   \"p.png\"}]";
+        let json = format!("{{\"version\": 1, \"note\": \"mine\", \"shots\": {shots}}}");
+        std::fs::write(&path, json).unwrap();
+        let affine = [[0.5, 0.0, 1.25], [0.0, 0.5, -3.0]];
+        let correspondence = Correspondence::from_affine(affine);
+        for _ in 0..2 {
+            write_correspondence(&path, &correspondence).unwrap();
+        }
+        let json = std::fs::read_to_string(&path).unwrap();
+        assert!(
+            json.contains("\"note\": \"mine\"") && json.contains(shots),
+            "{json}"
+        );
+        let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(
+            value["correspondence"],
+            serde_json::json!({ "affine": affine })
+        );
+    }
+}
