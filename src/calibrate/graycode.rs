@@ -181,7 +181,7 @@ impl GrayCodePhotos {
 type DecodedAxis = (Vec<GrayCodePosition>, [f64; 3]);
 
 /// Positions along one axis of the pixels with at least half of their bits clear.
-fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<GrayCodePosition> {
+pub(super) fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<GrayCodePosition> {
     let pixels = rows.len() * width as usize;
     // A saturated sample is at least white, which is 1.
     let value = |v: &f32| if v.is_nan() { 1.0 } else { *v };

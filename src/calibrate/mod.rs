@@ -3,10 +3,12 @@
 mod affine_fit;
 #[cfg(not(target_arch = "wasm32"))]
 mod displacement_fit;
+mod gray_code_quality;
 mod graycode;
 #[cfg(not(target_arch = "wasm32"))]
 mod graycode_fit;
 
+pub use gray_code_quality::GrayCodeQuality;
 pub use graycode::{BitPair, CalibrationError, GrayCodePhotos, LightPlaneAxis};
 #[cfg(not(target_arch = "wasm32"))]
 pub use graycode_fit::{GrayCodeFit, ResidualSummary};

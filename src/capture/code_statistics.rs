@@ -1,11 +1,15 @@
 //! What the codes of photographs say of the camera: saturation, declared or not, and codes of 8 bits.
 
+use crate::linalg::vectorise;
 use crate::transport::CHANNELS;
 
 /// Samples of a channel with the highest code that are so many a photograph, more than of a few stuck pixels, and so many
 /// times those with the next lower code, are saturated.
 const MIN_PILE: usize = 6;
 const MIN_PILE_RATIO: usize = 8;
+/// Pixels of a row that are summarised side by side. A row of [`MAX_SIDE`](crate::transport::MAX_SIDE) pixels has fewer times
+/// as many than a lane can count.
+const SUMMARY_PIXELS: usize = 16;
 /// 8-bit codes are scaled to 16 bits by one of these factors.
 const EIGHT_BIT_FACTORS: [u16; 2] = [257, 256];
 
@@ -42,17 +46,42 @@ impl CodeStatistics {
         }
     }
 
-    /// Counts a pixel.
-    pub fn add(&mut self, codes: [u16; CHANNELS], saturated: [bool; CHANNELS]) {
+    /// Counts the pixels of a row; codes from `saturated_from` on are saturated.
+    pub fn add_row(&mut self, row: &[[u16; CHANNELS]], saturated_from: [u32; CHANNELS]) {
+        for (are_multiples, factor) in self.are_multiples.iter_mut().zip(EIGHT_BIT_FACTORS) {
+            let mut codes = row.as_flattened().iter();
+            *are_multiples = *are_multiples && codes.all(|code| code.is_multiple_of(factor));
+        }
+        let RowSummary { highest, saturated } = vectorise(
+            #[cfg_attr(target_arch = "x86_64", inline(always))]
+            || RowSummary::new(row, saturated_from),
+        );
+        self.saturated += saturated;
         for c in 0..CHANNELS {
-            for (are_multiples, factor) in self.are_multiples.iter_mut().zip(EIGHT_BIT_FACTORS) {
-                *are_multiples &= codes[c].is_multiple_of(factor);
+            // Hardly any row has one of the highest codes of its photograph.
+            if highest[c] < self.highest[c][1].0 {
+                continue;
             }
-            match saturated[c] {
-                true => self.saturated += 1,
-                false => count(&mut self.highest[c], codes[c], 1),
+            let codes = row.iter().map(|codes| codes[c]);
+            for code in codes.filter(|code| u32::from(*code) < saturated_from[c]) {
+                count(&mut self.highest[c], code, 1);
             }
         }
+    }
+
+    /// The same counts if codes from `saturated_from` on are saturated, as far as these are the two highest.
+    #[must_use]
+    pub fn with_saturation(mut self, saturated_from: [u32; CHANNELS]) -> Self {
+        for (highest, from) in self.highest.iter_mut().zip(saturated_from) {
+            for (code, samples) in highest.iter_mut() {
+                if u32::from(*code) >= from {
+                    self.saturated += std::mem::take(samples);
+                    *code = 0;
+                }
+            }
+            highest.sort_by_key(|pair| std::cmp::Reverse(pair.0));
+        }
+        self
     }
 
     /// Adds the counts of another photograph.
@@ -92,6 +121,44 @@ impl CodeStatistics {
     }
 }
 
+/// The highest code of each channel in a row that is not saturated, and the number of saturated samples.
+struct RowSummary {
+    highest: [u16; CHANNELS],
+    saturated: usize,
+}
+
+impl RowSummary {
+    /// Lanes beside one another, for vector instructions.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    fn new(row: &[[u16; CHANNELS]], saturated_from: [u32; CHANNELS]) -> Self {
+        const LANES: usize = SUMMARY_PIXELS * CHANNELS;
+        let channel = |lane: usize| lane % CHANNELS;
+        // Codes above this one are saturated.
+        let limit = saturated_from.map(|from| from.saturating_sub(1).min(u16::MAX.into()) as u16);
+        let limits: [u16; LANES] = std::array::from_fn(|lane| limit[channel(lane)]);
+        let (mut highest, mut saturated) = ([0u16; LANES], [0u16; LANES]);
+        let (chunks, rest) = row.as_flattened().as_chunks();
+        let mut last = [0; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        for codes in chunks.iter().chain([&last]) {
+            for lane in 0..LANES {
+                let is_saturated = codes[lane] > limits[lane];
+                saturated[lane] += u16::from(is_saturated);
+                highest[lane] = highest[lane].max(if is_saturated { 0 } else { codes[lane] });
+            }
+        }
+        let mut summary = Self {
+            highest: [0; CHANNELS],
+            saturated: saturated.iter().map(|count| usize::from(*count)).sum(),
+        };
+        for (lane, code) in highest.into_iter().enumerate() {
+            let own = &mut summary.highest[channel(lane)];
+            *own = code.max(*own);
+        }
+        summary
+    }
+}
+
 /// Counts samples with a code.
 fn count([first, second]: &mut [(u16, usize); 2], code: u16, samples: usize) {
     if code == first.0 {
@@ -111,8 +178,9 @@ mod tests {
 
     fn statistics(codes: impl IntoIterator<Item = u16>, white: u16) -> CodeStatistics {
         let mut statistics = CodeStatistics::of_photograph();
-        for code in codes {
-            statistics.add([code; CHANNELS], [code >= white; CHANNELS]);
+        let pixels: Vec<[u16; CHANNELS]> = codes.into_iter().map(|code| [code; CHANNELS]).collect();
+        for row in pixels.chunks(1000) {
+            statistics.add_row(row, [u32::from(white); CHANNELS]);
         }
         statistics
     }
@@ -156,8 +224,21 @@ mod tests {
         assert_eq!(declared.undeclared_saturation(), [None; CHANNELS]);
         // Each channel for itself.
         let mut green = CodeStatistics::of_photograph();
-        codes(9000).for_each(|code| green.add([code, code.min(30_000), code], [false; CHANNELS]));
+        let row: Vec<_> = codes(9000)
+            .map(|code| [code, code.min(30_000), code])
+            .collect();
+        green.add_row(&row, [1 << 16; CHANNELS]);
         assert_eq!(green.undeclared_saturation(), [None, Some(30_000), None]);
+    }
+
+    #[test]
+    fn saturation_that_is_found_later_is_counted_as_if_it_had_been_declared() {
+        let clipped = || codes(9000).map(|code| code.min(40_000));
+        let found = statistics(clipped(), 60_000).with_saturation([40_000; CHANNELS]);
+        let declared = statistics(clipped(), 40_000);
+        assert_eq!(found.saturated, declared.saturated);
+        assert_eq!(found.undeclared_saturation(), [None; CHANNELS]);
+        assert_eq!(found.highest[0][0], declared.highest[0][0]);
     }
 
     #[test]

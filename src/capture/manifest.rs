@@ -166,15 +166,15 @@ impl ManifestLight {
     }
 
     /// Exactly one of gamma and response must be given, and be usable.
-    fn check(&self) -> Result<(), CaptureErrorKind> {
+    fn problems(&self) -> Vec<CaptureErrorKind> {
         let dimming = self.dimming.unwrap_or(0.0);
-        check_range(
+        let dimming = check_range(
             (0.0..=MAX_DIMMING).contains(&dimming),
             "light.dimming",
             dimming,
             "between 0 and 0.9",
-        )?;
-        match (&self.response, self.gamma) {
+        );
+        let response = match (&self.response, self.gamma) {
             (Some(_), Some(_)) => Err(CaptureErrorKind::ConflictingResponse),
             (Some(table), None) if !is_valid_response(table) => {
                 Err(CaptureErrorKind::InvalidResponse)
@@ -182,7 +182,11 @@ impl ManifestLight {
             (Some(_), None) => Ok(()),
             (None, Some(gamma)) => check_exponent("light.gamma", gamma),
             (None, None) => Err(CaptureErrorKind::MissingResponse),
-        }
+        };
+        [dimming, response]
+            .into_iter()
+            .filter_map(Result::err)
+            .collect()
     }
 
     /// Dims a pattern as the display does.
@@ -231,7 +235,29 @@ impl ManifestCamera {
 
     /// Whether a code of channel `c` is saturated.
     pub fn is_saturated(&self, code: u16, c: usize) -> bool {
-        f64::from(code) >= self.saturation.map_or(self.white, |codes| codes[c])
+        u32::from(code) >= self.saturated_from()[c]
+    }
+
+    /// The lowest code of each channel that is saturated.
+    pub fn saturated_from(&self) -> [u32; CHANNELS] {
+        let codes = self.saturation.unwrap_or([self.white; CHANNELS]);
+        codes.map(|code| code.ceil() as u32)
+    }
+
+    /// The measurements of the `codes` of pixels at `exposure`, less those of the `dark` frame; NaN where saturated.
+    pub fn measure(
+        &self,
+        codes: &[[u16; CHANNELS]],
+        exposure: f64,
+        dark: &[[f32; CHANNELS]],
+    ) -> impl Iterator<Item = [f32; CHANNELS]> {
+        let saturated_from = self.saturated_from();
+        codes.iter().zip(dark).map(move |(codes, dark)| {
+            std::array::from_fn(|c| match u32::from(codes[c]) >= saturated_from[c] {
+                true => f32::NAN,
+                false => self.linear(codes[c], exposure) - dark[c],
+            })
+        })
     }
 }
 
@@ -239,9 +265,21 @@ impl Manifest {
     /// Parses and checks `json`, the contents of the file at `path`.
     ///
     /// # Errors
-    /// If it is not JSON, has an unknown version, lacks a field, or a field has an invalid value. The error names
-    /// `path` and the field.
+    /// Those of [`parse_unchecked`](Self::parse_unchecked), and the first of the [`problems`](Self::problems).
     pub fn parse(json: &str, path: &Path) -> Result<Self, CaptureError> {
+        let manifest = Self::parse_unchecked(json, path)?;
+        match manifest.problems().into_iter().next() {
+            Some(problem) => Err(CaptureError::new(path, problem)),
+            None => Ok(manifest),
+        }
+    }
+
+    /// Parses `json`, the contents of the file at `path`, without a look at its [values](Self::problems).
+    ///
+    /// # Errors
+    /// If it is not JSON, has an unknown version, lacks a field, or a field has the wrong type. The error names `path` and
+    /// the field.
+    pub fn parse_unchecked(json: &str, path: &Path) -> Result<Self, CaptureError> {
         let error = |problem| CaptureError::new(path, problem);
         let json_error = |reason| error(CaptureErrorKind::NotAManifest(reason));
         // The version first: another version may differ in any other field.
@@ -265,15 +303,16 @@ impl Manifest {
             _ => json_error(e.into_inner()),
         })?;
         source.end().map_err(json_error)?;
-        manifest.check().map_err(error)?;
         Ok(Self {
             unknown,
             ..manifest
         })
     }
 
-    /// Checks all values; the error is the problem of the first invalid field.
-    fn check(&self) -> Result<(), CaptureErrorKind> {
+    /// The problems of all fields with invalid values.
+    pub fn problems(&self) -> Vec<CaptureErrorKind> {
+        let mut problems = Vec::new();
+        let mut check = |result: Result<(), CaptureErrorKind>| problems.extend(result.err());
         let (light, camera) = (&self.light, &self.camera);
         for (field, side) in [
             ("light.width", light.width),
@@ -282,45 +321,50 @@ impl Manifest {
             ("camera.height", camera.height),
         ] {
             let allowed = format!("between 1 and {MAX_SIDE}");
-            check_range((1..=MAX_SIDE).contains(&side), field, side, &allowed)?;
+            let valid = (1..=MAX_SIDE).contains(&side);
+            check(check_range(valid, field, side, &allowed));
         }
         let (black, white) = (camera.black, camera.white);
         let valid = (0.0..MAX_CODE).contains(&black);
-        check_range(valid, "camera.black", black, "a 16-bit code")?;
+        check(check_range(valid, "camera.black", black, "a 16-bit code"));
         let allowed = format!("a 16-bit code above \"camera.black\", {black}, by at least 1");
         let valid = white - black >= 1.0 && white <= MAX_CODE;
-        check_range(valid, "camera.white", white, &allowed)?;
+        check(check_range(valid, "camera.white", white, &allowed));
         for (c, saturation) in camera.saturation.iter().flatten().enumerate() {
             let valid = *saturation > black && *saturation <= white;
             let allowed =
                 format!("above \"camera.black\", {black}, and at most \"camera.white\", {white}");
-            check_range(
-                valid,
-                &format!("camera.saturation[{c}]"),
-                saturation,
-                &allowed,
-            )?;
+            let field = format!("camera.saturation[{c}]");
+            check(check_range(valid, &field, saturation, &allowed));
         }
-        match camera.response {
-            CameraResponse::Linear | CameraResponse::Srgb => {}
-            CameraResponse::Gamma(gamma) => check_exponent("camera.response.gamma", gamma)?,
+        check(match camera.response {
+            CameraResponse::Linear | CameraResponse::Srgb => Ok(()),
+            CameraResponse::Gamma(gamma) => check_exponent("camera.response.gamma", gamma),
             CameraResponse::Compression(slope) => {
-                check_exponent("camera.response.compression", slope)?;
+                check_exponent("camera.response.compression", slope)
             }
+        });
+        for problem in light.problems() {
+            check(Err(problem));
         }
-        light.check()?;
         if self.shots.is_empty() {
-            return Err(CaptureErrorKind::NoShots);
+            check(Err(CaptureErrorKind::NoShots));
         }
         for (i, shot) in self.shots.iter().enumerate() {
             let exposure = shot.exposure.unwrap_or(1.0);
             let valid = exposure.is_finite() && exposure > 0.0;
-            check_range(valid, &format!("shots[{i}].exposure"), exposure, "above 0")?;
+            let field = format!("shots[{i}].exposure");
+            check(check_range(valid, &field, exposure, "above 0"));
         }
         for (i, GrayCodeShot { bit, .. }) in self.graycode.iter().enumerate() {
             let field = format!("graycode[{i}].bit");
             let allowed = format!("between 0 and {MAX_GRAY_CODE_BIT}");
-            check_range(*bit <= MAX_GRAY_CODE_BIT, &field, bit, &allowed)?;
+            check(check_range(
+                *bit <= MAX_GRAY_CODE_BIT,
+                &field,
+                bit,
+                &allowed,
+            ));
         }
         if let Some(Correspondence {
             affine,
@@ -330,15 +374,72 @@ impl Manifest {
             let [[a, b, _], [c, d, _]] = affine;
             let finite = affine.iter().flatten().all(|x| x.is_finite());
             if !finite || a * d - b * c == 0.0 {
-                return Err(CaptureErrorKind::NotInvertible);
+                check(Err(CaptureErrorKind::NotInvertible));
             }
             let camera = self.camera.extent();
             if displacement.as_ref().is_some_and(|grid| !grid.fits(camera)) {
-                return Err(CaptureErrorKind::DisplacementOfOtherPicture);
+                check(Err(CaptureErrorKind::DisplacementOfOtherPicture));
             }
         }
-        Ok(())
+        problems
     }
+}
+
+impl Manifest {
+    /// Index in `graycode` of the photograph of a bit.
+    pub fn gray_code_index(&self, axis: LightPlaneAxis, bit: u32, inverted: bool) -> Option<usize> {
+        let bit_of = |shot: &GrayCodeShot| (shot.axis, shot.bit, shot.inverted);
+        let mut shots = self.graycode.iter();
+        shots.position(|shot| bit_of(shot) == (axis, bit, inverted))
+    }
+
+    /// All photographs that the manifest names.
+    pub fn photographs(&self) -> Vec<ListedPhotograph<'_>> {
+        use PhotographRole::{Dark, Flood, GrayCode, Shot};
+        let dark = self.dark.iter().map(|name| (Dark, name));
+        let flood = self.flood.iter().map(|name| (Flood, name));
+        let shots = self.shots.iter().enumerate();
+        let shots = shots.map(|(i, shot)| (Shot(i), &shot.photo));
+        let gray_code = self.graycode.iter().enumerate();
+        let gray_code = gray_code.map(|(i, shot)| (GrayCode(i), &shot.photo));
+        let all = dark.chain(flood).chain(shots).chain(gray_code);
+        all.map(|(role, name)| ListedPhotograph { role, name })
+            .collect()
+    }
+}
+
+/// What a photograph is in its capture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhotographRole {
+    /// Under no light.
+    Dark,
+    /// Under all light.
+    Flood,
+    /// That of a shot, by its index.
+    Shot(usize),
+    /// Of a bit of the Gray code, by its index in `graycode`.
+    GrayCode(usize),
+}
+
+impl PhotographRole {
+    /// The field that names the photograph.
+    pub fn field(self) -> String {
+        match self {
+            Self::Dark => "dark".to_owned(),
+            Self::Flood => "flood".to_owned(),
+            Self::Shot(i) => format!("shots[{i}].photo"),
+            Self::GrayCode(i) => format!("graycode[{i}].photo"),
+        }
+    }
+}
+
+/// A photograph that a manifest names.
+#[derive(Clone, Copy, Debug)]
+pub struct ListedPhotograph<'a> {
+    /// What it is.
+    pub role: PhotographRole,
+    /// Its file.
+    pub name: &'a str,
 }
 
 /// An exponent, or a ratio of slopes.

@@ -33,8 +33,11 @@ pub use folder::{
     read_unlisted_photo,
 };
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
-pub use folder::{GroundTruth, RELIT_FULL_SCALE};
+pub use folder::{GroundTruth, PhotographScan, RELIT_FULL_SCALE};
 pub(crate) use group_ids::{group_count, group_ids};
-pub use manifest::{CameraResponse, GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot};
+pub use manifest::{
+    CameraResponse, GrayCodeShot, ListedPhotograph, Manifest, ManifestCamera, ManifestLight,
+    PhotographRole, Shot,
+};
 pub use measurements::{LinearPhoto, Measurements, Pattern};
 pub use noise_model::NoiseModel;

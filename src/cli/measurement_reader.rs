@@ -30,7 +30,7 @@ pub fn read_patterns(
     };
     let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
     let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
-    Ok(folder.empty_measurements(shots, patterns, correspondence, dark))
+    Ok(folder.empty_measurements(shots, patterns, correspondence, dark.noise()))
 }
 
 /// Reads `rows` of a photograph, and the rest of the file, which checks that it is whole.
@@ -45,10 +45,12 @@ pub fn read_sample_of(
 }
 
 /// What the rows that were read say beside their samples.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct ReadSample {
     /// Of all rows of the photographs.
     pub codes: CodeStatistics,
+    /// The same of each.
+    pub codes_by_shot: Vec<CodeStatistics>,
     /// Of all rows of the flood photograph, if there is one.
     pub flood_codes: Option<CodeStatistics>,
     /// Pixels of the loaded rows that are filled from their neighbours.
@@ -125,16 +127,31 @@ impl<'a> MeasurementReader<'a> {
         })?;
         drop(bar);
         let codes = self.photos.into_par_iter().map(PhotographRowReader::finish);
-        let codes = codes.try_reduce(CodeStatistics::default, |a, b| Ok(a.merge(b)))?;
-        let quantum = f64::from(codes.step()) * self.code;
+        let codes = codes.collect::<Result<Vec<_>, _>>()?;
+        Ok(ReadSample::of_rows(measurements, codes, self.code))
+    }
+}
+
+impl ReadSample {
+    /// Fills the defective pixels of the rows that were read into `measurements`, whose noise has only its floor, and
+    /// estimates the gain from them. A code of one is the measurement `code`.
+    pub fn of_rows(
+        measurements: &mut Measurements,
+        codes_by_shot: Vec<CodeStatistics>,
+        code: f64,
+    ) -> Self {
+        let codes = codes_by_shot.iter().copied();
+        let codes = codes.fold(CodeStatistics::default(), CodeStatistics::merge);
+        let quantum = f64::from(codes.step()) * code;
         measurements.noise = measurements.noise.with_quantum(quantum);
         let defects = fill_defects(measurements, quantum);
         measurements.noise = NoiseModel::with_gain_from(measurements);
-        Ok(ReadSample {
+        Self {
             codes,
+            codes_by_shot,
             flood_codes: None,
             defects,
-        })
+        }
     }
 }
 

@@ -7,7 +7,9 @@ mod advice;
 mod assemble;
 mod calibrate;
 mod capture_writer;
+mod check;
 mod evaluate;
+mod finding;
 mod import;
 mod inspect;
 mod ltm_file;
@@ -47,6 +49,7 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Simulate(simulate::SimulateArgs),
     Photograph(photograph::PhotographArgs),
+    Check(check::CheckArgs),
     Recover(recover::RecoverArgs),
     Evaluate(evaluate::EvaluateArgs),
     Relight(relight::RelightArgs),
@@ -60,11 +63,11 @@ pub fn definition() -> clap::Command {
     Cli::command()
 }
 
-/// Exit status for photographs that `--strict` does not accept: `EX_DATAERR` of sysexits.
+/// Exit status for captures that `check` finds errors in, or `--strict` does not accept: `EX_DATAERR` of sysexits.
 const DATA_ERROR_STATUS: u8 = 65;
 
 /// Parses the command line and runs it. The exit status is 0 on success, 1 on failure, 2 for a wrong command line, 65 for
-/// warnings with `--strict`, 130 after an interruption.
+/// errors in a capture that is checked and for warnings with `--strict`, 130 after an interruption.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Patterns(args) => patterns::run(&args),
@@ -73,6 +76,7 @@ pub fn main() -> ExitCode {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Photograph(args) => photograph::run(&args),
+        Command::Check(args) => check::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Relight(args) => relight::run(&args),
@@ -86,6 +90,10 @@ pub fn main() -> ExitCode {
     if error.is::<process_resources::Interrupted>() {
         eprintln!("{error:#}");
         return ExitCode::from(process_resources::INTERRUPTED_STATUS);
+    }
+    // The report says why.
+    if error.is::<check::NotReadyError>() {
+        return ExitCode::from(DATA_ERROR_STATUS);
     }
     eprintln!("error: {}", advice::error_with_remedy(&error));
     if error.is::<value_parsers::UsageError>() {

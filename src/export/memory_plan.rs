@@ -158,14 +158,7 @@ impl MemoryPlan {
     /// The camera rows to prepare the recovery from: all if they fit, otherwise rows of tiles spread evenly over the
     /// picture.
     pub fn sample_rows(&self) -> CameraRowSet {
-        if self.fits_photographs() {
-            return CameraRowSet::all(self.camera.height);
-        }
-        let tile_rows = self.tile_rows();
-        let count = (self.max_rows() / TILE_SIDE).clamp(1, tile_rows);
-        // The middles of `count` equal parts.
-        let middle = |i: u32| ((2 * i + 1) * tile_rows) / (2 * count);
-        CameraRowSet::from_strips((0..count).map(|i| self.pixel_rows(middle(i)..middle(i) + 1, 0)))
+        spread_tile_rows(self.camera, self.max_rows())
     }
 
     /// Strips of tile rows from the top down, each with the camera rows to load for it: its own and `halo` more on
@@ -204,6 +197,19 @@ impl MemoryPlan {
         let start = (tile_rows.start * TILE_SIDE).saturating_sub(halo);
         start..(tile_rows.end * TILE_SIDE + halo).min(self.camera.height)
     }
+}
+
+/// All rows if they are at most `max_rows`, otherwise rows of tiles spread evenly over the picture, at least one.
+pub fn spread_tile_rows(camera: Extent, max_rows: u32) -> CameraRowSet {
+    if max_rows >= camera.height {
+        return CameraRowSet::all(camera.height);
+    }
+    let tile_rows = camera.height.div_ceil(TILE_SIDE);
+    let count = (max_rows / TILE_SIDE).clamp(1, tile_rows);
+    // The middles of `count` equal parts.
+    let first_row = |i: u32| (2 * i + 1) * tile_rows / (2 * count) * TILE_SIDE;
+    let strips = (0..count).map(first_row);
+    CameraRowSet::from_strips(strips.map(|y| y..(y + TILE_SIDE).min(camera.height)))
 }
 
 #[cfg(test)]

@@ -14,10 +14,11 @@ mod tile_record;
 
 pub use capture_remedy::capture_remedy;
 pub use encoding::{FileQuality, encode_file, file_geometry, file_tile};
-pub use memory_plan::{MemoryPlan, TooLittleMemory};
+pub use memory_plan::{MemoryPlan, TooLittleMemory, spread_tile_rows};
 pub use metadata::{Provenance, metadata};
 pub use preparation::{
-    MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation, prepare, saturated_percent,
+    MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation, implausibly_saturated, prepare,
+    saturated_percent,
 };
 pub use shot_selection::{TooFewShots, select_shots};
 pub use tile_record::{decode as decode_tile, encode as encode_tile};

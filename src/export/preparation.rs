@@ -2,6 +2,7 @@
 
 use crate::capture::Measurements;
 use crate::job_executor::Executor;
+use crate::linalg::median;
 use crate::recover::{
     HoldoutValidation, Method, PreparedRecovery, RecoverError, RecoverySettings, TailEstimate,
     WindowSizeEstimate,
@@ -13,6 +14,9 @@ pub const MIN_PLAUSIBLE_SNR: Decibels = Decibels(13.0);
 
 /// Percentage of saturated samples above which an error in the calibration is likelier than highlights.
 const MAX_SATURATED_PERCENT: f64 = 2.0;
+
+/// The same percentage of one photograph, relative to the median of all, above which it was exposed differently.
+const MIN_SATURATION_RATIO: f64 = 4.0;
 
 /// A recovery that is ready to run.
 #[derive(Debug)]
@@ -39,10 +43,31 @@ pub fn saturated_percent(saturated: usize, measurements: &Measurements) -> f64 {
 
 /// Whether so many samples are saturated that the white level or the exposure is probably wrong.
 pub fn has_implausible_saturation(saturated: usize, measurements: &Measurements) -> bool {
-    // Of several exposures the longest are meant to saturate.
+    has_one_exposure(measurements)
+        && saturated_percent(saturated, measurements) > MAX_SATURATED_PERCENT
+}
+
+/// The photographs that saturate too many samples; `saturated` are the numbers of these samples, `[L]`. If that is so of all
+/// together, those above the limit, otherwise those that are also far above most others.
+pub fn implausibly_saturated(saturated: &[usize], measurements: &Measurements) -> Vec<usize> {
+    if saturated.is_empty() || !has_one_exposure(measurements) {
+        return Vec::new();
+    }
+    let samples = (measurements.camera.area() * CHANNELS) as f64;
+    let percents = saturated.iter().map(|own| 100.0 * *own as f64 / samples);
+    let percents: Vec<f64> = percents.collect();
+    let limit = match has_implausible_saturation(saturated.iter().sum(), measurements) {
+        true => MAX_SATURATED_PERCENT,
+        false => MAX_SATURATED_PERCENT.max(MIN_SATURATION_RATIO * median(&percents)),
+    };
+    let is_above = |l: &usize| percents[*l] > limit;
+    (0..percents.len()).filter(is_above).collect()
+}
+
+/// Of several exposures the longest are meant to saturate.
+fn has_one_exposure(measurements: &Measurements) -> bool {
     let full_scale = &measurements.full_scale;
-    let has_one_exposure = full_scale.iter().all(|value| *value == full_scale[0]);
-    has_one_exposure && saturated_percent(saturated, measurements) > MAX_SATURATED_PERCENT
+    full_scale.iter().all(|value| *value == full_scale[0])
 }
 
 /// Prepares a recovery by `method`, in `window` or in one that is estimated.

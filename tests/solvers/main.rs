@@ -174,7 +174,8 @@ fn embedded_fixture_equals_its_folder() {
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
     let patterns = shots.iter().map(|&i| folder.read_pattern(i).unwrap());
     let correspondence = folder.manifest().correspondence.clone().unwrap();
-    let mut read = folder.empty_measurements(&shots, patterns.collect(), correspondence, &dark);
+    let mut read =
+        folder.empty_measurements(&shots, patterns.collect(), correspondence, dark.noise());
     read.rows = CameraRowSet::all(read.camera.height);
     let whole = |mut photo: PhotographRowReader| {
         let mut picture = LinearPhoto::new();

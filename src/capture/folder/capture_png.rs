@@ -77,7 +77,7 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
         let extent = extent_of(&rows.reader);
         let mut codes = Vec::with_capacity(extent.area());
         while let Some(row) = rows.next()? {
-            codes.extend(row);
+            codes.extend_from_slice(row);
         }
         rows.finish()?;
         Ok((extent, codes))
@@ -94,7 +94,11 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
         if info.interlaced {
             return Err(self.error(CaptureErrorKind::Interlaced));
         }
-        Ok(Rgb16RowReader { reader, file: self })
+        Ok(Rgb16RowReader {
+            reader,
+            row: Vec::new(),
+            file: self,
+        })
     }
 
     fn open(&self, transformations: Transformations) -> Result<PngReader<'a, F>, CaptureError> {
@@ -148,19 +152,22 @@ fn sample_type((color, depth): (ColorType, BitDepth)) -> String {
 pub(super) struct Rgb16RowReader<'a, F: CaptureFiles> {
     file: CapturePng<'a, F>,
     reader: PngReader<'a, F>,
+    row: Vec<[u16; CHANNELS]>,
 }
 
 impl<F: CaptureFiles> Rgb16RowReader<'_, F> {
     /// The codes of the next row; `None` after the last.
-    pub fn next(&mut self) -> Result<Option<impl Iterator<Item = [u16; CHANNELS]>>, CaptureError> {
+    pub fn next(&mut self) -> Result<Option<&[[u16; CHANNELS]]>, CaptureError> {
         let row = self.reader.next_row();
         let row = row.map_err(|e| self.file.unreadable(e))?;
         Ok(row.map(|row| {
-            let (pixels, _) = row.data().as_chunks();
-            let codes = |&[r, s, g, h, b, c]: &[u8; 2 * CHANNELS]| {
-                [[r, s], [g, h], [b, c]].map(u16::from_be_bytes)
-            };
-            pixels.iter().map(codes)
+            let (codes, _) = row.data().as_chunks();
+            self.row.resize(codes.len() / CHANNELS, [0; CHANNELS]);
+            let samples = self.row.as_flattened_mut().iter_mut();
+            samples
+                .zip(codes)
+                .for_each(|(sample, code)| *sample = u16::from_be_bytes(*code));
+            self.row.as_slice()
         }))
     }
 

@@ -8,6 +8,8 @@ mod disk_files;
 mod files;
 mod photograph_row_reader;
 #[cfg(not(target_arch = "wasm32"))]
+mod photograph_scan;
+#[cfg(not(target_arch = "wasm32"))]
 mod truth;
 
 use std::io::Read;
@@ -17,6 +19,8 @@ pub use self::disk_files::DiskFiles;
 pub use self::files::CaptureFiles;
 pub use self::photograph_row_reader::{DarkFrame, PhotographRowReader};
 #[cfg(not(target_arch = "wasm32"))]
+pub use self::photograph_scan::PhotographScan;
+#[cfg(not(target_arch = "wasm32"))]
 pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
 use self::capture_png::CapturePng;
@@ -24,7 +28,7 @@ use self::files::CaptureFile;
 use super::camera_row_set::CameraRowSet;
 use super::code_statistics::CodeStatistics;
 use super::error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
-use super::manifest::{GrayCodeShot, Manifest};
+use super::manifest::Manifest;
 use super::measurements::{LinearPhoto, Measurements, Pattern};
 use super::noise_model::NoiseModel;
 use crate::calibrate::{BitPair, GrayCodePhotos, LightPlaneAxis};
@@ -67,19 +71,20 @@ impl CaptureFolder {
     /// # Errors
     /// If `root` is not a folder with a valid `capture.json`.
     pub fn open(root: &Path) -> Result<Self, CaptureError> {
-        let path = root.join(MANIFEST_NAME);
-        let problem = match (root.exists(), root.is_dir(), path.exists()) {
-            (false, ..) => Some("there is no such folder"),
-            (_, false, _) => Some("is a file"),
-            (.., false) => Some("is not a capture folder: it has no capture.json"),
-            _ => None,
-        };
-        if let Some(problem) = problem {
-            let problem = CaptureErrorKind::NotACapture(problem);
-            return Err(CaptureError::new(root, problem));
-        }
-        let root = root.to_owned();
-        Self::from_files(DiskFiles { root })
+        Self::from_files(files_in(root)?)
+    }
+
+    /// The same without a look at the [values](Manifest::problems) of the manifest's fields.
+    ///
+    /// # Errors
+    /// If `root` is not a folder with a `capture.json` that can be parsed.
+    pub fn open_unchecked(root: &Path) -> Result<Self, CaptureError> {
+        Self::from_files_unchecked(files_in(root)?)
+    }
+
+    /// The folder.
+    pub fn root(&self) -> &Path {
+        &self.files.root
     }
 
     /// The known transport, if the folder has any.
@@ -92,12 +97,37 @@ impl CaptureFolder {
     }
 }
 
+/// The files of the folder `root`, which must have a manifest.
+fn files_in(root: &Path) -> Result<DiskFiles, CaptureError> {
+    let path = root.join(MANIFEST_NAME);
+    let problem = match (root.exists(), root.is_dir(), path.exists()) {
+        (false, ..) => Some("there is no such folder"),
+        (_, false, _) => Some("is a file"),
+        (.., false) => Some("is not a capture folder: it has no capture.json"),
+        _ => None,
+    };
+    if let Some(problem) = problem {
+        let problem = CaptureErrorKind::NotACapture(problem);
+        return Err(CaptureError::new(root, problem));
+    }
+    let root = root.to_owned();
+    Ok(DiskFiles { root })
+}
+
 impl<F: CaptureFiles> CaptureFolder<F> {
     /// Reads the manifest of a folder with these files.
     ///
     /// # Errors
     /// If there is no valid `capture.json`.
     pub fn from_files(files: F) -> Result<Self, CaptureError> {
+        let folder = Self::from_files_unchecked(files)?;
+        match folder.manifest.problems().into_iter().next() {
+            Some(problem) => Err(CaptureError::new(folder.manifest_path(), problem)),
+            None => Ok(folder),
+        }
+    }
+
+    fn from_files_unchecked(files: F) -> Result<Self, CaptureError> {
         let path = files.path(MANIFEST_NAME);
         let mut text = String::new();
         CaptureFile::open(&files, MANIFEST_NAME)
@@ -105,7 +135,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             .map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)))?;
         // Some editors write a byte order mark, which is not JSON.
         let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
-        let manifest = Manifest::parse(json, &path)?;
+        let manifest = Manifest::parse_unchecked(json, &path)?;
         Ok(Self::new(files, manifest))
     }
 
@@ -190,10 +220,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         rows: &CameraRowSet,
         (axis, bit, inverted): (LightPlaneAxis, u32, bool),
     ) -> Result<LinearPhoto, CaptureError> {
-        let mut shots = self.manifest.graycode.iter().enumerate();
-        let bit_of = |shot: &GrayCodeShot| (shot.axis, shot.bit, shot.inverted);
-        let found = shots.find(|(_, shot)| bit_of(shot) == (axis, bit, inverted));
-        let Some((i, shot)) = found else {
+        let Some(i) = self.manifest.gray_code_index(axis, bit, inverted) else {
             let problem = CaptureErrorKind::MissingGrayCode {
                 axis,
                 bit,
@@ -202,7 +229,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             return Err(CaptureError::new(self.manifest_path(), problem));
         };
         let field = format!("graycode[{i}].photo");
-        let mut reader = self.open_photo(&shot.photo, field, 1.0, dark)?;
+        let mut reader = self.open_photo(&self.manifest.graycode[i].photo, field, 1.0, dark)?;
         let mut photo = LinearPhoto::new();
         reader.read(rows, &mut photo)?;
         reader.finish()?;
@@ -283,7 +310,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         shots: &[usize],
         patterns: Vec<Pattern>,
         correspondence: Correspondence,
-        dark: &DarkFrame,
+        noise: NoiseModel,
     ) -> Measurements {
         let full_scale = shots.iter().map(|&i| (1.0 / self.exposure(i)) as f32);
         Measurements {
@@ -295,12 +322,15 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             rows: CameraRowSet::from_strips([]),
             photos: vec![LinearPhoto::new(); shots.len()],
             flood: None,
-            noise: dark.noise,
+            noise,
         }
     }
 
     /// Relative exposure of shot `i`.
-    fn exposure(&self, i: usize) -> f64 {
+    ///
+    /// # Panics
+    /// If there is no such shot.
+    pub fn exposure(&self, i: usize) -> f64 {
         self.manifest.shots[i].exposure.unwrap_or(1.0)
     }
 

@@ -9,7 +9,6 @@ use crate::capture::error::CaptureError;
 use crate::capture::manifest::ManifestCamera;
 use crate::capture::measurements::LinearPhoto;
 use crate::capture::noise_model::NoiseModel;
-use crate::transport::CHANNELS;
 
 /// The photograph under no light, which is subtracted from all others.
 #[derive(Clone, Debug)]
@@ -18,6 +17,13 @@ pub struct DarkFrame {
     pub(super) light: LinearPhoto,
     /// The noise floor estimated from it.
     pub(super) noise: NoiseModel,
+}
+
+impl DarkFrame {
+    /// The noise floor estimated from it; of rounding alone without a dark frame.
+    pub fn noise(&self) -> NoiseModel {
+        self.noise
+    }
 }
 
 /// Reads the camera rows of one photograph once, from the top down.
@@ -74,23 +80,14 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
         photo: &mut LinearPhoto,
     ) -> Result<(), CaptureError> {
         let width = self.camera.width as usize;
+        let saturated_from = self.camera.saturated_from();
         while self.next_row < end
             && let Some(codes) = self.codes.next()?
         {
-            let is_selected = rows.contains(self.next_row);
-            let dark = &self.dark.light[self.next_row as usize * width..][..width];
-            for (codes, dark) in codes.zip(dark) {
-                let saturated: [bool; CHANNELS] =
-                    std::array::from_fn(|c| self.camera.is_saturated(codes[c], c));
-                self.statistics.add(codes, saturated);
-                if is_selected {
-                    photo.push(std::array::from_fn::<_, CHANNELS, _>(|c| {
-                        match saturated[c] {
-                            true => f32::NAN,
-                            false => self.camera.linear(codes[c], self.exposure) - dark[c],
-                        }
-                    }));
-                }
+            self.statistics.add_row(codes, saturated_from);
+            if rows.contains(self.next_row) {
+                let dark = &self.dark.light[self.next_row as usize * width..][..width];
+                photo.extend(self.camera.measure(codes, self.exposure, dark));
             }
             self.next_row += 1;
         }

@@ -97,9 +97,9 @@ fn parse_max_bytes(text: &str) -> Result<ByteCount, String> {
 
 /// The value of `--window`; `None` for "auto". The alias hides the `Option` from clap, which would take it as an
 /// argument without a default.
-type WindowArg = Option<Window>;
+pub type WindowArg = Option<Window>;
 
-fn parse_window(text: &str) -> Result<WindowArg, String> {
+pub fn parse_window(text: &str) -> Result<WindowArg, String> {
     if text == "auto" {
         return Ok(None);
     }

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::messages::Warning;
 use crate::capture::{CameraResponse, CodeStatistics, Manifest};
+use crate::cli::finding::Finding;
 use crate::recover::ResponseHypothesis;
 use crate::transport::{CHANNELS, Decibels};
 
@@ -48,8 +48,8 @@ impl EstimatedField {
         }
     }
 
-    /// The warning that the photographs contradict the manifest at `path`.
-    pub fn warning(&self, path: &str, reason: &str) -> Warning {
+    /// The finding that the photographs contradict the manifest at `path`: a warning unless the estimate is used.
+    pub fn finding(&self, path: &str, reason: &str) -> Finding {
         let (code, remedy) = match self.field {
             "light.dimming" => (
                 "display-dims",
@@ -61,16 +61,18 @@ impl EstimatedField {
             ),
             _ => ("display-response", "Measure the display's response"),
         };
-        let ending = match self.is_used {
-            true => "The estimated value is used, as --trust estimated says".to_owned(),
-            false => format!(
-                "{remedy}, or declare {} or give --trust estimated",
-                self.member()
+        match self.is_used {
+            true => Finding::note(
+                code,
+                format!("{path}: {reason}. The estimated value is used, as --trust estimated says"),
             ),
-        };
-        Warning {
-            code,
-            message: format!("{path}: {reason}. {ending}"),
+            false => Finding::warning(
+                code,
+                format!(
+                    "{path}: {reason}. {remedy}, or declare {} or give --trust estimated",
+                    self.member()
+                ),
+            ),
         }
     }
 }
@@ -100,15 +102,15 @@ pub fn with_saturation(
 }
 
 /// The warning that codes are saturated though this is not declared.
-pub fn saturation_warning(field: &EstimatedField, path: &str) -> Warning {
-    Warning {
-        code: "saturation-undeclared",
-        message: format!(
+pub fn saturation_warning(field: &EstimatedField, path: &str) -> Finding {
+    let member = field.member();
+    Finding::warning(
+        "saturation-undeclared",
+        format!(
             "{path}: many samples have one code, and hardly any the codes just below: they are saturated, and left out. \
-             Declare {}, or expose less",
-            field.member()
+             Declare {member}, or expose less"
         ),
-    }
+    )
 }
 
 /// The manifest with another response.

@@ -15,6 +15,34 @@ const MAX_CONTRAST_ROWS: u32 = 128;
 /// Axes of the light plane.
 const AXES: [LightPlaneAxis; 2] = [LightPlaneAxis::X, LightPlaneAxis::Y];
 
+/// Where a preparation gets its photographs from.
+pub trait PhotographSource {
+    /// What a sample keeps of the dark frame.
+    type Dark;
+
+    /// What runs jobs, and may be cancelled.
+    fn cores(&self) -> &InterruptibleCores;
+
+    /// The same photographs by another manifest.
+    fn read_by(
+        &self,
+        sample: CaptureSample<Self::Dark>,
+        manifest: Manifest,
+    ) -> Result<CaptureSample<Self::Dark>>;
+
+    /// The photographs of other shots by another manifest.
+    fn read_shots(
+        &self,
+        sample: CaptureSample<Self::Dark>,
+        shots: Vec<usize>,
+        manifest: Manifest,
+    ) -> Result<CaptureSample<Self::Dark>>;
+
+    /// The contrasts of bits 0 and 1 of the Gray code in the sharpest camera pixels, each along the axis where it is lower.
+    /// `None` if these photographs are missing, as nothing else needs them where the correspondence is declared.
+    fn finest_contrasts(&self, sample: &CaptureSample<Self::Dark>) -> Option<[f32; 2]>;
+}
+
 /// Reads photographs as far as they fit in memory.
 #[derive(Clone, Copy)]
 pub struct SampleSource<'a> {
@@ -23,11 +51,11 @@ pub struct SampleSource<'a> {
 }
 
 /// Measurements of the rows that fit in memory, as the manifest says.
-pub struct CaptureSample {
+pub struct CaptureSample<D = DarkFrame> {
     pub folder: CaptureFolder,
     /// Indices of the shots.
     pub shots: Vec<usize>,
-    pub dark: DarkFrame,
+    pub dark: D,
     pub measurements: Measurements,
     pub read: ReadSample,
 }
@@ -61,10 +89,37 @@ impl SampleSource<'_> {
             read,
         })
     }
+}
 
-    /// The contrasts of bits 0 and 1 of the Gray code in the sharpest camera pixels, each along the axis where it is lower.
-    /// `None` if these photographs are missing, as nothing else needs them where the correspondence is declared.
-    pub fn finest_contrasts(&self, sample: &CaptureSample) -> Option<[f32; 2]> {
+impl PhotographSource for SampleSource<'_> {
+    type Dark = DarkFrame;
+
+    fn cores(&self) -> &InterruptibleCores {
+        self.cores
+    }
+
+    /// Reads them unless they were read by that manifest. Frees their memory before.
+    fn read_by(&self, sample: CaptureSample, manifest: Manifest) -> Result<CaptureSample> {
+        if *sample.folder.manifest() == manifest {
+            return Ok(sample);
+        }
+        let shots = sample.shots.clone();
+        self.read_shots(sample, shots, manifest)
+    }
+
+    /// Reads them. Frees the memory of the others before.
+    fn read_shots(
+        &self,
+        sample: CaptureSample,
+        shots: Vec<usize>,
+        manifest: Manifest,
+    ) -> Result<CaptureSample> {
+        let folder = sample.folder.with_manifest(manifest);
+        drop(sample);
+        self.read(folder, shots, || Ok(()))
+    }
+
+    fn finest_contrasts(&self, sample: &CaptureSample) -> Option<[f32; 2]> {
         // A few, as the photographs are in memory.
         let height = sample.measurements.camera.height;
         let step = height.div_ceil(MAX_CONTRAST_ROWS);
@@ -79,28 +134,5 @@ impl SampleSource<'_> {
             Some(x?.min(y?))
         };
         Some([lower(0)?, lower(1)?])
-    }
-
-    /// Reads the same photographs by another manifest, unless they were read by it. Frees their memory before.
-    pub fn read_by(&self, sample: CaptureSample, manifest: Manifest) -> Result<CaptureSample> {
-        if *sample.folder.manifest() == manifest {
-            return Ok(sample);
-        }
-        let folder = sample.folder.with_manifest(manifest);
-        let shots = sample.shots.clone();
-        drop(sample);
-        self.read(folder, shots, || Ok(()))
-    }
-
-    /// Reads the photographs of other shots by another manifest. Frees the memory of the others before.
-    pub fn read_shots(
-        &self,
-        sample: CaptureSample,
-        shots: Vec<usize>,
-        manifest: Manifest,
-    ) -> Result<CaptureSample> {
-        let folder = sample.folder.with_manifest(manifest);
-        drop(sample);
-        self.read(folder, shots, || Ok(()))
     }
 }

@@ -1,32 +1,50 @@
-//! What a recovery finds doubtful in its capture.
+//! What is found in a capture while a recovery is prepared.
 
 use anyhow::Result;
 
 use super::calibration::EstimatedField;
-use super::messages::{StrictError, Warning};
+use super::messages::StrictError;
+use crate::cli::finding::{Finding, Severity};
 
-/// What is doubtful in the capture, so far.
+/// What has been found so far.
 #[derive(Default)]
 pub struct Findings {
-    /// Printed already.
-    pub warnings: Vec<Warning>,
+    pub list: Vec<Finding>,
     pub estimated_fields: Vec<EstimatedField>,
     /// Shots that are left out as the camera had moved.
     pub moved_shots: Vec<usize>,
+    /// Whether findings are printed at once.
+    is_printed: bool,
 }
 
 impl Findings {
-    /// Prints and keeps warnings.
-    pub fn warn(&mut self, warnings: impl IntoIterator<Item = Warning>) {
-        for warning in warnings {
-            eprintln!("warning: {}", warning.message);
-            self.warnings.push(warning);
+    /// Findings that are printed at once.
+    pub fn printed() -> Self {
+        Self {
+            is_printed: true,
+            ..Self::default()
         }
+    }
+
+    /// Keeps findings.
+    pub fn add(&mut self, findings: impl IntoIterator<Item = Finding>) {
+        for finding in findings {
+            if self.is_printed {
+                eprintln!("{}: {}", finding.severity, finding.message);
+            }
+            self.list.push(finding);
+        }
+    }
+
+    /// All but the notes.
+    pub fn warnings(&self) -> impl Iterator<Item = &Finding> {
+        let list = self.list.iter();
+        list.filter(|finding| finding.severity < Severity::Note)
     }
 
     /// Fails after a warning if `strict` is set.
     pub fn check(&self, strict: bool) -> Result<()> {
-        match strict && !self.warnings.is_empty() {
+        match strict && self.warnings().next().is_some() {
             true => Err(StrictError.into()),
             false => Ok(()),
         }
@@ -37,12 +55,9 @@ impl Findings {
         self.estimated_fields.iter().all(|field| field.is_used)
     }
 
-    /// Warns of a field that the photographs contradict, or notes that the estimate is used.
-    pub fn add_estimate(&mut self, field: EstimatedField, warning: Warning) {
-        match field.is_used {
-            true => eprintln!("note: {}", warning.message),
-            false => self.warn([warning]),
-        }
+    /// Keeps a field that the photographs contradict, with the `finding` that says so.
+    pub fn add_estimate(&mut self, field: EstimatedField, finding: Finding) {
+        self.add([finding]);
         self.estimated_fields.push(field);
     }
 }

@@ -13,7 +13,7 @@ use super::capture_sample::{CaptureSample, SampleSource};
 use super::checkpoint::{Checkpoint, compress_tile, lock};
 use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
 use super::messages;
-use super::preparation::{CapturePreparation, PreparedCapture};
+use super::preparation::{CapturePreparation, PreparationSettings, PreparedCapture};
 use super::report::{RecoverReport, photograph_reports};
 use crate::capture::{CaptureFolder, DefectivePixels};
 use crate::cli::measurement_reader::MeasurementReader;
@@ -67,7 +67,7 @@ impl RecoverJob<'_> {
         checkpoint: &Mutex<Checkpoint>,
     ) -> Result<RecoverReport> {
         let preparation = CapturePreparation {
-            args: self.args,
+            settings: PreparationSettings::of(self.args),
             folder: self.folder,
             source: self.source,
         };
@@ -75,7 +75,7 @@ impl RecoverJob<'_> {
             sample,
             prepared,
             mut findings,
-        } = preparation.run(sample)?;
+        } = preparation.run(sample, self.args)?;
         let recovery = &prepared.recovery;
         let saturated = sample.read.codes.saturated;
         let (method, window) = (self.args.method(), recovery.geometry().window);
@@ -90,8 +90,8 @@ impl RecoverJob<'_> {
         let (folder, shots) = (folder.clone(), shots.clone());
         let noise = sample.measurements.noise;
         let (overexposed, defects) = self.recover_tiles(sample, recovery, checkpoint)?;
-        messages::note_defective_pixels(defects);
-        findings.warn(messages::overexposure(overexposed));
+        findings.add(messages::defective_pixels(defects));
+        findings.add(messages::overexposure(overexposed));
         findings.check(self.args.strict)?;
         let provenance = Provenance::new(folder.manifest(), self.shots);
         let metadata = export::metadata(&provenance, method);
@@ -122,7 +122,7 @@ impl RecoverJob<'_> {
             overexposed_pixels: overexposed,
             hot_pixels: defects.hot,
             dead_pixels: defects.dead,
-            estimated_fields: findings.estimated_fields,
+            estimated_fields: findings.estimated_fields.clone(),
             file_bytes,
             photograph_reports: photograph_reports(
                 &folder,
@@ -130,7 +130,7 @@ impl RecoverJob<'_> {
                 recovery,
                 &findings.moved_shots,
             ),
-            warnings: findings.warnings,
+            warnings: findings.warnings().cloned().collect(),
         })
     }
 

@@ -3,21 +3,21 @@
 //! [`job`] reads the photographs, prepares a recovery, recovers its tiles into a [`checkpoint`] and encodes them.
 
 mod args;
-mod calibration;
-mod capture_sample;
+pub(super) mod calibration;
+pub(super) mod capture_sample;
 mod checkpoint;
 mod checkpoint_key;
-mod findings;
+pub(super) mod findings;
 mod job;
-mod messages;
-mod preparation;
-mod report;
+pub(super) mod messages;
+pub(super) mod preparation;
+pub(super) mod report;
 
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-pub use self::args::{MethodName, RecoverArgs, TrustedCalibration};
+pub use self::args::{MethodName, RecoverArgs, TrustedCalibration, WindowArg, parse_window};
 pub use self::messages::StrictError;
 pub use self::report::RecoverReport;
 

@@ -4,19 +4,22 @@ use anyhow::{Error, Result, bail};
 
 use super::args::{RecoverArgs, TrustedCalibration};
 use super::calibration;
-use super::capture_sample::{CaptureSample, SampleSource};
+use super::capture_sample::{CaptureSample, PhotographSource};
 use super::findings::Findings;
 use super::messages::{self, UnusableError};
 use crate::capture::{CameraResponse, CaptureFolder, CodeStatistics, Manifest};
+use crate::cli::finding::Finding;
 use crate::cli::progress;
 use crate::export::{self, MIN_PLAUSIBLE_SNR, PreparedExport};
+use crate::job_executor::Executor;
 use crate::recover::{
-    CaptureFault, PreparedRecovery, RecoverError, WindowSizeEstimate, diagnose, find_response,
+    CaptureFault, Method, PreparedRecovery, RecoverError, WindowSizeEstimate, diagnose,
+    find_response,
 };
 use crate::transport::{Decibels, Window};
 
 /// SNR on held-out patterns below which hardly anything in a file would be right.
-const MIN_USABLE_SNR: Decibels = Decibels(2.0);
+pub const MIN_USABLE_SNR: Decibels = Decibels(2.0);
 /// Rise of the SNR on held-out patterns by which another response explains the photographs better.
 const MIN_SNR_RISE: Decibels = Decibels(0.3);
 /// Responses that are tried in turn.
@@ -29,28 +32,48 @@ const MIN_STEP: f64 = 0.1;
 const MIN_STEP_RATIO: f64 = 25.0;
 
 /// A recovery that is ready to run, with the photographs that it is prepared from.
-pub struct PreparedCapture {
-    pub sample: CaptureSample,
+pub struct PreparedCapture<D> {
+    pub sample: CaptureSample<D>,
     pub prepared: PreparedExport,
     pub findings: Findings,
 }
 
+/// How a recovery is prepared.
+#[derive(Clone, Copy)]
+pub struct PreparationSettings {
+    pub method: Method,
+    /// `None` to estimate it.
+    pub window: Option<Window>,
+    pub trust: TrustedCalibration,
+}
+
+impl PreparationSettings {
+    pub fn of(args: &RecoverArgs) -> Self {
+        Self {
+            method: args.method(),
+            window: args.window,
+            trust: args.trust,
+        }
+    }
+}
+
 /// What a recovery is prepared by.
-pub struct CapturePreparation<'a> {
-    pub args: &'a RecoverArgs,
+pub struct CapturePreparation<'a, S> {
+    pub settings: PreparationSettings,
     /// As it is declared.
     pub folder: &'a CaptureFolder,
-    pub source: SampleSource<'a>,
+    pub source: S,
 }
 
-/// The photographs, the recovery that is prepared from them, and why it may be bad.
-struct Attempt {
-    sample: CaptureSample,
-    prepared: Result<PreparedExport, RecoverError>,
-    cause: Option<String>,
+/// The photographs, and the recovery that is prepared from them.
+pub struct Attempt<D> {
+    pub sample: CaptureSample<D>,
+    pub prepared: Result<PreparedExport, RecoverError>,
+    /// Why it may be bad.
+    pub cause: Option<Finding>,
 }
 
-impl Attempt {
+impl<D> Attempt<D> {
     fn snr(&self) -> Option<Decibels> {
         self.prepared.as_ref().ok()?.expected_snr()
     }
@@ -86,60 +109,38 @@ impl Attempt {
     }
 }
 
-impl CapturePreparation<'_> {
+impl<S: PhotographSource> CapturePreparation<'_, S> {
     /// Prepares the recovery, with warnings of all that is doubtful.
     ///
     /// # Errors
-    /// If nothing can be recovered, if hardly anything would be right and neither `--force` is given, and after a warning
-    /// with `--strict`.
-    pub fn run(&self, sample: CaptureSample) -> Result<PreparedCapture> {
-        let mut findings = Findings::default();
-        findings.warn(messages::unknown_fields(self.folder));
-        let sample = self.with_saturation(sample, &mut findings)?;
-        findings.warn(messages::eight_bits(&sample.read.codes));
-        let saturated = sample.read.codes.saturated;
-        findings.warn(messages::saturation(saturated, &sample.measurements));
-        let attempt = self.attempt(sample);
-        let attempt = self.with_capture_fault(attempt, &mut findings)?;
-        let attempt = self.with_response(attempt, &mut findings)?;
-        let attempt = self.with_dimming(attempt, &mut findings)?;
+    /// If nothing can be recovered, if hardly anything would be right and `--force` is not given, and after a warning with
+    /// `--strict`.
+    pub fn run(
+        &self,
+        sample: CaptureSample<S::Dark>,
+        args: &RecoverArgs,
+    ) -> Result<PreparedCapture<S::Dark>> {
+        let mut findings = Findings::printed();
         let Attempt {
             sample,
             prepared,
             cause,
-        } = attempt;
-        // Codes that are not linear have less contrast.
-        if findings.are_responses_right() {
-            let contrasts = self.source.finest_contrasts(&sample);
-            findings.warn(contrasts.and_then(messages::display_sharpness));
-        }
-        let prepared = match (prepared, cause.clone()) {
+        } = self.examine(sample, &mut findings)?;
+        let prepared = match (prepared, &cause) {
             (Ok(prepared), _) => prepared,
-            (Err(_), Some(cause)) => bail!(cause),
-            (Err(error), None) => return Err(self.recover_error(error, &sample)),
+            (Err(_), Some(cause)) => bail!(cause.message.clone()),
+            (Err(error), None) => return Err(self.recover_error(error, &sample.shots)),
         };
-        if cause.is_none() && findings.are_responses_right() {
-            let flicker = prepared
-                .recovery
-                .flicker(&sample.measurements, self.source.cores);
-            findings.warn(flicker.map(messages::flicker));
-        }
-        findings.warn(messages::preparation(&prepared));
-        findings.warn(messages::photographs(
-            &sample.folder,
-            &sample.shots,
-            &prepared.recovery,
-        ));
+        findings.add(messages::preparation(&prepared));
         let snr = prepared.expected_snr();
-        let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !self.args.force);
+        let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !args.force);
         match (cause, unusable) {
-            (Some(cause), Some(_)) if !self.args.strict => {
-                bail!("{cause}; --force writes the file nevertheless")
+            (Some(cause), Some(_)) if !args.strict => {
+                bail!("{}; --force writes the file nevertheless", cause.message)
             }
-            (Some(cause), _) => findings.warn([messages::capture_warning(cause)]),
-            (None, _) => {}
+            (cause, _) => findings.add(cause),
         }
-        findings.check(self.args.strict)?;
+        findings.check(args.strict)?;
         match unusable {
             Some(snr) => bail!(UnusableError(snr)),
             None => Ok(PreparedCapture {
@@ -150,36 +151,77 @@ impl CapturePreparation<'_> {
         }
     }
 
+    /// Prepares the recovery as far as that is possible, and looks for all that is wrong with the photographs, or with what
+    /// is declared of them.
+    ///
+    /// # Errors
+    /// If photographs cannot be read, and if the executor is cancelled.
+    pub fn examine(
+        &self,
+        sample: CaptureSample<S::Dark>,
+        findings: &mut Findings,
+    ) -> Result<Attempt<S::Dark>> {
+        findings.add(messages::unknown_fields(self.folder));
+        let sample = self.with_saturation(sample, findings)?;
+        let (folder, shots, read) = (&sample.folder, &sample.shots, &sample.read);
+        findings.add(messages::eight_bits(folder, shots, read));
+        let saturation = messages::saturation(folder, shots, read, &sample.measurements);
+        findings.add(saturation);
+        let attempt = self.attempt(sample);
+        let attempt = self.with_capture_fault(attempt, findings)?;
+        let attempt = self.with_response(attempt, findings)?;
+        let attempt = self.with_dimming(attempt, findings)?;
+        let sample = &attempt.sample;
+        let cores = self.source.cores();
+        // Codes that are not linear have less contrast.
+        if findings.are_responses_right() {
+            let contrasts = self.source.finest_contrasts(sample);
+            findings.add(contrasts.and_then(messages::display_sharpness));
+        }
+        if let Ok(prepared) = &attempt.prepared {
+            let recovery = &prepared.recovery;
+            if attempt.cause.is_none() && findings.are_responses_right() {
+                let flicker = recovery.flicker(&sample.measurements, cores);
+                findings.add(flicker.map(messages::flicker));
+            }
+            let photographs = messages::photographs(&sample.folder, &sample.shots, recovery);
+            findings.add(photographs);
+        }
+        cores.check_cancelled()?;
+        Ok(attempt)
+    }
+
     /// Leaves out samples that are saturated though this is not declared.
     fn with_saturation(
         &self,
-        sample: CaptureSample,
+        sample: CaptureSample<S::Dark>,
         findings: &mut Findings,
-    ) -> Result<CaptureSample> {
+    ) -> Result<CaptureSample<S::Dark>> {
         let codes = [Some(sample.read.codes), sample.read.flood_codes];
         let codes: Vec<CodeStatistics> = codes.into_iter().flatten().collect();
         let manifest = sample.folder.manifest();
         let Some((manifest, field)) = calibration::with_saturation(manifest, &codes) else {
             return Ok(sample);
         };
-        findings.warn([calibration::saturation_warning(
-            &field,
-            &self.manifest_path(),
-        )]);
-        findings.estimated_fields.push(field);
+        let warning = calibration::saturation_warning(&field, &self.manifest_path());
+        findings.add_estimate(field, warning);
         self.source.read_by(sample, manifest)
     }
 
     /// Looks for a fault of the capture as a whole. If the camera moved once, only the photographs from one of its places
     /// are used.
-    fn with_capture_fault(&self, attempt: Attempt, findings: &mut Findings) -> Result<Attempt> {
+    fn with_capture_fault(
+        &self,
+        attempt: Attempt<S::Dark>,
+        findings: &mut Findings,
+    ) -> Result<Attempt<S::Dark>> {
         if !attempt.is_doubtful() {
             return Ok(attempt);
         }
         let sample = &attempt.sample;
         let fault = {
             let _spinner = progress::spinner("looking for a cause");
-            let (window, cores) = (self.window(), self.source.cores);
+            let (window, cores) = (self.window(), self.source.cores());
             diagnose(
                 &sample.measurements,
                 window,
@@ -209,7 +251,7 @@ impl CapturePreparation<'_> {
             manifest.flood = None;
         }
         let warning = messages::moved_once(&sample.folder, &sample.shots, (first, shift), &still);
-        findings.warn([warning]);
+        findings.add([warning]);
         let (moved, shots) = partition(&sample.shots, &still);
         findings.moved_shots = moved;
         let sample = self.source.read_shots(attempt.sample, shots, manifest)?;
@@ -218,7 +260,11 @@ impl CapturePreparation<'_> {
 
     /// Looks for responses of display and camera that explain the photographs better than those declared. Responses are
     /// tried in turn, as one is estimated with the mean function that follows from the one before.
-    fn with_response(&self, declared: Attempt, findings: &mut Findings) -> Result<Attempt> {
+    fn with_response(
+        &self,
+        declared: Attempt<S::Dark>,
+        findings: &mut Findings,
+    ) -> Result<Attempt<S::Dark>> {
         let is_usable = declared.prepared.is_ok() || declared.is_doubtful();
         if declared.cause.is_some() || !is_usable {
             return Ok(declared);
@@ -231,7 +277,7 @@ impl CapturePreparation<'_> {
         let Attempt {
             mut sample,
             prepared,
-            cause,
+            mut cause,
         } = declared;
         let mut best: Option<(Manifest, Decibels, PreparedExport)> = None;
         for _ in 0..MAX_TRIALS {
@@ -256,16 +302,18 @@ impl CapturePreparation<'_> {
                 None => break,
             }
         }
-        let is_used = best.is_some() && self.args.trust == TrustedCalibration::Estimated;
+        let is_used = best.is_some() && self.settings.trust == TrustedCalibration::Estimated;
         if let Some((estimated, snr, _)) = &best {
             for mut field in calibration::changed_responses(&original, estimated) {
                 field.is_used = is_used;
                 let reason = calibration::response_reason(&field, declared_snr, *snr);
-                let warning = field.warning(&self.manifest_path(), &reason);
+                let finding = field.finding(&self.manifest_path(), &reason);
                 if prepared.is_err() && !is_used {
-                    bail!(warning.message);
+                    findings.estimated_fields.push(field);
+                    cause = cause.or(Some(finding));
+                } else {
+                    findings.add_estimate(field, finding);
                 }
-                findings.add_estimate(field, warning);
             }
         }
         match best.filter(|_| is_used) {
@@ -283,8 +331,8 @@ impl CapturePreparation<'_> {
     }
 
     /// The manifest with another response, if one may explain the photographs better.
-    fn likely_manifest(&self, attempt: &Attempt) -> Result<Option<Manifest>> {
-        let (sample, cores) = (&attempt.sample, self.source.cores);
+    fn likely_manifest(&self, attempt: &Attempt<S::Dark>) -> Result<Option<Manifest>> {
+        let (sample, cores) = (&attempt.sample, self.source.cores());
         let measurements = &sample.measurements;
         let _spinner = progress::spinner("testing responses");
         let found = pollster::block_on(async {
@@ -307,7 +355,11 @@ impl CapturePreparation<'_> {
     }
 
     /// Looks whether the display dims bright pictures.
-    fn with_dimming(&self, attempt: Attempt, findings: &mut Findings) -> Result<Attempt> {
+    fn with_dimming(
+        &self,
+        attempt: Attempt<S::Dark>,
+        findings: &mut Findings,
+    ) -> Result<Attempt<S::Dark>> {
         let Some(prepared) = (attempt.prepared.as_ref().ok()).filter(|_| !attempt.is_doubtful())
         else {
             return Ok(attempt);
@@ -317,15 +369,15 @@ impl CapturePreparation<'_> {
             return Ok(attempt);
         }
         let measurements = &attempt.sample.measurements;
-        let Some(dimming) = prepared.recovery.dimming(measurements, self.source.cores) else {
+        let Some(dimming) = prepared.recovery.dimming(measurements, self.source.cores()) else {
             return Ok(attempt);
         };
         let manifest = attempt.sample.folder.manifest();
         let (amended, mut field) = calibration::with_dimming(manifest, dimming);
-        field.is_used = self.args.trust == TrustedCalibration::Estimated;
+        field.is_used = self.settings.trust == TrustedCalibration::Estimated;
         let is_used = field.is_used;
-        let warning = field.warning(&self.manifest_path(), &messages::dimming_reason(dimming));
-        findings.add_estimate(field, warning);
+        let finding = field.finding(&self.manifest_path(), &messages::dimming_reason(dimming));
+        findings.add_estimate(field, finding);
         match is_used {
             true => Ok(self.attempt(self.source.read_by(attempt.sample, amended)?)),
             false => Ok(attempt),
@@ -333,10 +385,11 @@ impl CapturePreparation<'_> {
     }
 
     /// Chooses the window, and learns or chooses what the method needs.
-    fn attempt(&self, sample: CaptureSample) -> Attempt {
+    fn attempt(&self, sample: CaptureSample<S::Dark>) -> Attempt<S::Dark> {
         let _spinner = progress::spinner("learning");
-        let (method, window) = (self.args.method(), self.args.window);
-        let preparation = export::prepare(&sample.measurements, method, window, self.source.cores);
+        let PreparationSettings { method, window, .. } = self.settings;
+        let cores = self.source.cores();
+        let preparation = export::prepare(&sample.measurements, method, window, cores);
         Attempt {
             prepared: pollster::block_on(preparation),
             sample,
@@ -346,23 +399,25 @@ impl CapturePreparation<'_> {
 
     /// The window, or the largest that may be chosen.
     fn window(&self) -> Window {
-        self.args.window.unwrap_or(WindowSizeEstimate::MAX_WINDOW)
+        self.settings
+            .window
+            .unwrap_or(WindowSizeEstimate::MAX_WINDOW)
     }
 
     fn manifest_path(&self) -> String {
         self.folder.manifest_path().display().to_string()
     }
 
-    /// Names the capture, or the shots, that an error of the recovery is about.
-    fn recover_error(&self, error: RecoverError, sample: &CaptureSample) -> Error {
+    /// Names the capture, or those of the `shots` that were read, that an error of the recovery is about.
+    pub fn recover_error(&self, error: RecoverError, shots: &[usize]) -> Error {
         match error {
             RecoverError::Cancelled(cancelled) => cancelled.into(),
             RecoverError::MismatchedPatterns { pattern_indices } => {
-                let shots = pattern_indices.iter().map(|&l| sample.shots[l]);
+                let shots = pattern_indices.iter().map(|&l| shots[l]);
                 messages::mismatched_shots(self.folder, shots)
             }
             RecoverError::IndistinctPhotographs => Error::new(error).context(self.manifest_path()),
-            other => Error::new(other).context(self.args.capture.display().to_string()),
+            other => Error::new(other).context(self.folder.root().display().to_string()),
         }
     }
 }

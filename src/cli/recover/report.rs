@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use super::args::RecoverArgs;
 use super::calibration::EstimatedField;
-use super::messages::Warning;
 use crate::capture::{CaptureFolder, Manifest, NoiseModel};
+use crate::cli::finding::Finding;
 use crate::cli::report::{format_bytes, format_shots, print_line};
 use crate::recover::{
     CommonModeWeight, MOVED_CODE, Method, PhotographCorrection, PhotographFault, PreparedRecovery,
@@ -51,7 +51,7 @@ pub struct RecoverReport {
     /// One for each photograph that was read.
     #[serde(rename = "photograph_table")]
     pub photograph_reports: Vec<PhotographReport>,
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<Finding>,
 }
 
 /// What was found of one photograph.

@@ -1,0 +1,68 @@
+//! A photograph that is decoded once, for all that is asked of it: its codes in some rows, and statistics of all codes.
+
+use super::CaptureFolder;
+use super::capture_png::CapturePng;
+use super::files::CaptureFiles;
+use crate::capture::camera_row_set::CameraRowSet;
+use crate::capture::code_statistics::CodeStatistics;
+use crate::capture::error::CaptureError;
+use crate::capture::manifest::ListedPhotograph;
+use crate::transport::CHANNELS;
+
+/// What a photograph is examined by.
+#[derive(Clone, Debug)]
+pub struct PhotographScan {
+    /// The codes of the rows that were asked for, `[rows, width]`.
+    pub rows: Vec<[u16; CHANNELS]>,
+    /// Of all rows.
+    pub codes: CodeStatistics,
+    /// Of all codes: photographs with noise that share it, and their statistics, are one and the same.
+    pub checksum: u32,
+}
+
+impl<F: CaptureFiles> CaptureFolder<F> {
+    /// Decodes a photograph that the manifest names, and keeps the codes of `rows`.
+    ///
+    /// # Errors
+    /// If it is missing, not a 16-bit PNG of the camera's size, or damaged.
+    pub fn scan(
+        &self,
+        photograph: ListedPhotograph<'_>,
+        rows: &CameraRowSet,
+    ) -> Result<PhotographScan, CaptureError> {
+        let camera = &self.manifest.camera;
+        let mut reader = self.png(photograph).open_rgb16()?;
+        let saturated_from = camera.saturated_from();
+        let mut scan = PhotographScan {
+            rows: Vec::with_capacity(rows.count() * camera.width as usize),
+            codes: CodeStatistics::of_photograph(),
+            checksum: 0,
+        };
+        for y in 0..camera.height {
+            let Some(codes) = reader.next()? else {
+                break;
+            };
+            scan.codes.add_row(codes, saturated_from);
+            scan.checksum = crc32c::crc32c_append(scan.checksum, bytemuck::cast_slice(codes));
+            if rows.contains(y) {
+                scan.rows.extend_from_slice(codes);
+            }
+        }
+        reader.finish()?;
+        Ok(scan)
+    }
+
+    /// Looks whether a photograph that the manifest names exists and has the right type and size, without decoding it.
+    ///
+    /// # Errors
+    /// If it is missing, or not a 16-bit PNG of the camera's size.
+    pub fn check_header(&self, photograph: ListedPhotograph<'_>) -> Result<(), CaptureError> {
+        self.png(photograph).open_rgb16().map(drop)
+    }
+
+    fn png<'a>(&'a self, photograph: ListedPhotograph<'a>) -> CapturePng<'a, F> {
+        let field = Some(photograph.role.field());
+        let extent = self.manifest.camera.extent();
+        CapturePng::new(&self.files, photograph.name, extent, field)
+    }
+}
