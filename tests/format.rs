@@ -751,6 +751,48 @@ fn other_minor_versions_and_unknown_extensions_are_read_unless_they_must_be_unde
     );
 }
 
+#[test]
+fn invalid_displacements_are_refused() {
+    let mut recovered = mixed();
+    recovered.geometry = common::bent(recovered.geometry);
+    let other = FormatExtension {
+        tag: *b"TEST",
+        must_understand: false,
+        data: vec![0; 8],
+    };
+    let encode = |extensions| recovered.encode_by(QUALITY, &SequentialExecutor, extensions);
+    let file = bytes(&encode(vec![other.clone()]).unwrap());
+    let (transport, _) = decode(&file, 100).unwrap();
+    assert_eq!(transport.geometry, recovered.geometry);
+    let at = |tag: &[u8]| file.windows(4).position(|bytes| bytes == tag).unwrap();
+    let (record, second) = (at(b"DISP"), at(b"TEST"));
+    let data = record + 12;
+    let refused = |at: usize, value: &[u8], part: &str| {
+        let edit = |f: &mut Vec<u8>| f[at..at + value.len()].copy_from_slice(value);
+        let error = decode(&sealed(file.clone(), edit), 100)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(part), "{value:?}: {error}");
+    };
+    for spacing in [0u16, 7, 4097, u16::MAX] {
+        refused(data, &spacing.to_le_bytes(), "displacement");
+    }
+    // Another spacing has another number of control points.
+    refused(data, &9u16.to_le_bytes(), "extensions");
+    for step in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        refused(data + 4, &step.to_le_bytes(), "displacement");
+    }
+    refused(data + 8, b"no frame", "extensions");
+    refused(second, b"DISP", "two displacements");
+    refused(record, b"OTHR", "OTHR");
+    let foreign = FormatExtension {
+        tag: *b"DISP",
+        ..other
+    };
+    let error = encode(vec![foreign]).unwrap_err().to_string();
+    assert!(error.contains("DISP"), "{error}");
+}
+
 /// Offsets of the header's fields.
 mod field {
     pub const RANK: usize = 96;

@@ -57,6 +57,7 @@ def constants():
         f"| rank | {decoder.MAX_RANK} |",
         f"| scans | {decoder.MAX_SCANS} |",
         f"| extensions | {power_of_two(decoder.MAX_EXTENSION_BYTES)} bytes |",
+        f"| control points of a displacement | {power_of_two(decoder.MAX_CONTROL_POINTS)} |",
         f"| metadata | {power_of_two(decoder.MAX_METADATA_BYTES)} bytes |",
         f"| content of a frame other than the directory | {power_of_two(content)} bytes |",
         f"| tokens of a chunk | {power_of_two(content)} |",
@@ -89,7 +90,7 @@ def check_offsets(text):
             if kind:
                 size = TYPE_BYTES[name] if name in TYPE_BYTES else int(name.removesuffix(" bytes"))
                 at += size * int(count or 1)
-    assert len(tables) == 3, "other tables of offsets than header, scan record and extension"
+    assert len(tables) == 4, "other tables of offsets than header, scan record, extension and displacement"
 
 
 # Appendix H: a whole file.

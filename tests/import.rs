@@ -146,7 +146,20 @@ fn imports_that_cannot_be_right_are_refused() {
         fail(&arguments.split('\n').collect::<Vec<_>>())
     };
     let error = refused(&["--element", "3"]);
-    assert!(error.contains("1, 2, 4, 8"), "{error}");
+    assert!(error.contains("elements of 4, 8, 16"), "{error}");
+    let error = refused(&["--element", "2"]);
+    assert!(error.contains("elements of 4, 8, 16"), "{error}");
+    let exchanged = [
+        "import",
+        "-o",
+        &capture,
+        "--patterns",
+        &photos,
+        "--photos",
+        &pictures,
+    ];
+    let error = fail(&exchanged);
+    assert!(error.contains("exchanged"), "{error}");
     let photo = fs::read_dir(&photos)
         .unwrap()
         .next()

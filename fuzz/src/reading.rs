@@ -65,8 +65,8 @@ pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
     let Some(index) = index(file) else {
         return;
     };
-    let geometry = index.header.geometry;
-    assert!(geometry.validate().is_ok());
+    let geometry = &index.header.geometry;
+    assert!(geometry.check().is_ok());
     assert_eq!(index.tiles(), geometry.tile_grid().area());
     let mut next = index.header.index_bytes();
     for chunk in index.chunks() {
@@ -121,7 +121,7 @@ pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
 /// # Panics
 /// If one does not hold.
 pub fn check_transport(transport: &Transport) {
-    let geometry = transport.geometry;
+    let geometry = &transport.geometry;
     let tiles: Vec<_> = geometry.tiles().collect();
     assert_eq!(transport.tiles.len(), tiles.len());
     let (rank, area) = (transport.basis.rank(), geometry.window.area());

@@ -206,7 +206,7 @@ impl ArbitraryInput {
         executor: &impl Executor,
     ) -> Result<EncodedFile, FormatError> {
         let source = EncoderInput {
-            geometry: self.geometry,
+            geometry: self.geometry.clone(),
             basis: self.basis.as_ref(),
             tile: &|i| Ok(self.tiles[i].clone()),
             metadata: self.metadata.clone(),

@@ -21,7 +21,7 @@ const MIN_SPACING: f64 = 16.0;
 const MAX_POINTS: f64 = 4096.0;
 /// τ: typical second difference of the displacements of neighbouring control points, in light elements. Where pixels are
 /// decoded, their number outweighs it.
-const BENDING: f64 = 0.1;
+const TYPICAL_SECOND_DIFFERENCE: f64 = 0.1;
 /// Weight of a displacement itself: it tends to zero far from all decoded pixels.
 const RIDGE: f64 = 1e-4;
 /// Least number of pixels whose median is a first estimate of a control point.
@@ -35,6 +35,8 @@ const REWEIGHTING_ROUNDS: usize = 8;
 const MIN_DISPLACEMENT: f64 = 0.5;
 /// Share of the affine map's loss that remains, above which a displacement explains nothing.
 const MAX_LOSS_RATIO: f64 = 0.95;
+/// Pixels that the fit takes at most, as one: far more than control points.
+const MAX_PIXELS: usize = 1 << 19;
 /// Least step of a code, in light elements.
 const MIN_STEP: f32 = 1.0 / 256.0;
 
@@ -63,8 +65,19 @@ pub(super) fn fit_displacement(
     let largest = u.iter().chain(&v).fold(0.0, |max, d| d.abs().max(max));
     let step = MIN_STEP.max((largest / f64::from(i16::MAX)) as f32 * (1.0 + f32::EPSILON));
     let code = |d: f64| (d / f64::from(step)).round() as i16;
-    let codes = u.into_iter().zip(v).map(|(u, v)| [code(u), code(v)]);
+    let codes = points.cells().map(|(column, row)| {
+        let at = point_index(points, column as usize, row as usize);
+        [code(u[at]), code(v[at])]
+    });
     DisplacementGrid::new(spacing, step, points, codes.collect()).ok()
+}
+
+/// Index of a control point in the systems of equations, which count along the shorter side: the band is twice as wide as that.
+fn point_index(points: Extent, column: usize, row: usize) -> usize {
+    match points.width <= points.height {
+        true => row * points.width as usize + column,
+        false => column * points.height as usize + row,
+    }
 }
 
 /// A pixel's residual of the affine map, and its bilinear weights.
@@ -89,7 +102,6 @@ impl AxisFit {
         positions: &[GrayCodePosition],
         &[a, b, constant]: &[f64; 3],
     ) -> Self {
-        let width = points.width as usize;
         let cell = |pixel: u32, points: u32| {
             let at = (f64::from(pixel) + 0.5) / f64::from(spacing);
             let first = (at as u32).min(points - 2);
@@ -99,7 +111,7 @@ impl AxisFit {
             let pixel = position.pixel;
             let (column, right) = cell(pixel.x, points.width);
             let (row, down) = cell(pixel.y, points.height);
-            let first = row * width + column;
+            let point = |column: usize, row: usize| point_index(points, column, row);
             let (left, up) = (1.0 - right, 1.0 - down);
             let predicted =
                 a * (f64::from(pixel.x) + 0.5) + b * (f64::from(pixel.y) + 0.5) + constant;
@@ -107,16 +119,19 @@ impl AxisFit {
                 value: position.position - predicted,
                 deviation: position.width / 12f64.sqrt(),
                 weights: [
-                    (first, left * up),
-                    (first + 1, right * up),
-                    (first + width, left * down),
-                    (first + width + 1, right * down),
+                    (point(column, row), left * up),
+                    (point(column + 1, row), right * up),
+                    (point(column, row + 1), left * down),
+                    (point(column + 1, row + 1), right * down),
                 ],
             }
         };
+        let step = positions.len().div_ceil(MAX_PIXELS).max(1);
+        // An odd step does not keep to some columns of a picture whose width is even.
+        let chosen = positions.iter().step_by(step | 1);
         Self {
             points,
-            residuals: positions.iter().map(residual).collect(),
+            residuals: chosen.map(residual).collect(),
         }
     }
 
@@ -162,26 +177,28 @@ impl AxisFit {
 
     /// DᵀD / τ², and the ridge.
     fn smoothness(&self) -> BandedMatrix {
-        let [width, height] = [self.points.width, self.points.height].map(|side| side as usize);
-        let mut matrix = BandedMatrix::zeros(width * height, 2 * width);
-        let weight = BENDING.powi(2).recip();
+        let points = self.points;
+        let [width, height] = [points.width, points.height].map(|side| side as usize);
+        let mut matrix = BandedMatrix::zeros(width * height, 2 * width.min(height));
+        let weight = TYPICAL_SECOND_DIFFERENCE.powi(2).recip();
+        let at = |column, row| point_index(points, column, row);
         for row in 0..height {
             for column in 0..width {
-                let at = row * width + column;
-                matrix.add_square(RIDGE, &[(at, 1.0)]);
-                let mut add_curvature = |step: usize| {
-                    let second = [(at, 1.0), (at + step, -2.0), (at + 2 * step, 1.0)];
-                    matrix.add_square(weight, &second);
+                let here = at(column, row);
+                matrix.add_square(RIDGE, &[(here, 1.0)]);
+                let mut add_curvature = |next: usize, last: usize| {
+                    matrix.add_square(weight, &[(here, 1.0), (next, -2.0), (last, 1.0)]);
                 };
                 if column + 2 < width {
-                    add_curvature(1);
+                    add_curvature(at(column + 1, row), at(column + 2, row));
                 }
                 if row + 2 < height {
-                    add_curvature(width);
+                    add_curvature(at(column, row + 1), at(column, row + 2));
                 }
                 if column + 1 < width && row + 1 < height {
-                    let below = at + width;
-                    let twist = [(at, 1.0), (at + 1, -1.0), (below, -1.0), (below + 1, 1.0)];
+                    let (right, below) = (at(column + 1, row), at(column, row + 1));
+                    let corner = at(column + 1, row + 1);
+                    let twist = [(here, 1.0), (right, -1.0), (below, -1.0), (corner, 1.0)];
                     matrix.add_square(2.0 * weight, &twist);
                 }
             }
@@ -221,5 +238,87 @@ impl Residual {
     /// (r_n − B_n d) / σ_n.
     fn error(&self, displacements: &[f64]) -> f64 {
         (self.value - self.interpolated(displacements)) / self.deviation
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::CameraPixel;
+
+    const AFFINE: [[f64; 3]; 2] = [[0.5, 0.0, 1.0], [0.0, 0.5, 2.0]];
+
+    /// Positions along an axis that are displaced by `displacement`, of every pixel that it displaces at all.
+    fn positions(
+        camera: Extent,
+        [a, b, constant]: [f64; 3],
+        displacement: impl Fn(f64, f64) -> Option<f64>,
+    ) -> Vec<GrayCodePosition> {
+        let position = |(x, y): (u32, u32)| {
+            let [px, py] = [x, y].map(|at| f64::from(at) + 0.5);
+            let exact = a * px + b * py + constant + displacement(px, py)?;
+            Some(GrayCodePosition {
+                pixel: CameraPixel { x, y },
+                position: exact.floor() + 0.5,
+                width: 1.0,
+            })
+        };
+        camera.cells().filter_map(position).collect()
+    }
+
+    /// The largest error of a fitted grid at the pixels of a picture.
+    fn error(
+        camera: Extent,
+        displacement: impl Fn(f64, f64) -> Option<f64>,
+        wanted: impl Fn(f64, f64) -> f64,
+    ) -> f64 {
+        let u = positions(camera, AFFINE[0], displacement);
+        let v = positions(camera, AFFINE[1], |_, _| Some(0.0));
+        let grid = fit_displacement(camera, [&u, &v], &AFFINE).unwrap();
+        let errors = camera.cells().map(|(x, y)| {
+            let [x, y] = [x, y].map(|at| f64::from(at) + 0.5);
+            let [du, dv] = grid.at(x, y);
+            (du - wanted(x, y)).hypot(dv)
+        });
+        errors.fold(0.0, f64::max)
+    }
+
+    fn bowl(x: f64, y: f64) -> f64 {
+        0.0005 * ((x - 60.0).powi(2) + (y - 40.0).powi(2))
+    }
+
+    #[test]
+    fn a_smooth_displacement_is_found_in_both_orders_of_control_points() {
+        for camera in [Extent::new(120, 80), Extent::new(80, 120)] {
+            let error = error(camera, |x, y| Some(bowl(x, y)), bowl);
+            assert!(error < 0.3, "{camera}: {error}");
+        }
+    }
+
+    #[test]
+    fn wrong_bits_and_dark_parts_do_not_matter() {
+        let wrong = |x: f64, y: f64| {
+            let is_dark = (70.0..95.0).contains(&x) && (20.0..50.0).contains(&y);
+            let is_wrong = ((x + 7.0 * y) as u32).is_multiple_of(5);
+            (!is_dark).then(|| bowl(x, y) + if is_wrong { 32.0 } else { 0.0 })
+        };
+        let error = error(Extent::new(120, 80), wrong, bowl);
+        assert!(error < 0.6, "{error}");
+    }
+
+    #[test]
+    fn small_displacements_and_few_pixels_are_no_bend() {
+        let camera = Extent::new(120, 80);
+        let fit = |scale: f64, every: usize| {
+            let [u, v] = [scale, 0.0].map(|scale| {
+                let row = AFFINE[usize::from(scale == 0.0)];
+                let all = positions(camera, row, |x, y| Some(scale * bowl(x, y)));
+                all.into_iter().step_by(every).collect::<Vec<_>>()
+            });
+            fit_displacement(camera, [&u, &v], &AFFINE)
+        };
+        assert!(fit(0.05, 1).is_none());
+        assert!(fit(1.0, 1).is_some());
+        assert!(fit(0.05, 9_000).is_none());
     }
 }

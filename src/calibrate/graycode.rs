@@ -264,11 +264,8 @@ mod tests {
         let camera = Extent::new(60, 40);
         let affine = [[0.5, 0.02, 1.3], [-0.03, 0.45, 4.0]];
         for blur in [0.0, 0.8, 2.0] {
-            let found = photograph(camera, affine, 5, blur).fit(camera);
-            let found = found
-                .unwrap()
-                .correspondence
-                .at(CameraPixel { x: 50, y: 5 });
+            let found = photograph(camera, affine, 5, blur).fit_affine(camera);
+            let found = found.unwrap().at(CameraPixel { x: 50, y: 5 });
             let truth = Correspondence::from_affine(affine).at(CameraPixel { x: 50, y: 5 });
             let apart = (found.u - truth.u).hypot(found.v - truth.v);
             assert!(apart < 0.1, "blur {blur}: {apart} elements off");
@@ -301,7 +298,7 @@ mod tests {
             bit.plain.fill([0.0; 3]);
             bit.inverted.fill([0.0; 3]);
         }
-        let error = code.fit(camera);
+        let error = code.fit_affine(camera);
         assert_eq!(
             error,
             Err(CalibrationError::TooFewPixels {
@@ -310,7 +307,7 @@ mod tests {
             })
         );
         assert_eq!(
-            GrayCodePhotos::default().fit(camera),
+            GrayCodePhotos::default().fit_affine(camera),
             Err(CalibrationError::MissingBits(LightPlaneAxis::X))
         );
     }

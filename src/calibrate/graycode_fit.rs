@@ -7,7 +7,7 @@ use super::displacement_fit::fit_displacement;
 use crate::linalg;
 use crate::transport::{CameraPixel, Correspondence, Extent};
 
-/// A correspondence from Gray code, and what it leaves.
+/// A correspondence from Gray code, and its residuals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrayCodeFit {
     /// The correspondence.
@@ -21,7 +21,7 @@ pub struct GrayCodeFit {
 }
 
 /// Distances between a correspondence and the positions of the pixels that are decoded to one light element, in light
-/// elements. A position is the centre of an element, so that even a perfect correspondence leaves a median of 0.40.
+/// elements. A position is the centre of an element, so that even a perfect correspondence leaves a median of 0.3 to 0.4.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResidualSummary {
     /// Half of the distances are smaller.

@@ -20,6 +20,20 @@ use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
 
 /// Memory for the photographs of the Gray code, in bytes. Rows are left out of larger ones.
 const MAX_GRAY_CODE_BYTES: u64 = 1 << 30;
+/// Memory for the decoded position of a camera pixel, in bytes.
+const POSITION_BYTES: u64 = 64;
+
+/// Median of the residuals, in light elements, above which the Gray code is wrong: scattering leaves about one.
+const MAX_RESIDUAL: f64 = 2.0;
+/// What is wrong then.
+pub const IMPLAUSIBLE_FIT: &str = "the Gray code fits no smooth correspondence, as half of the camera pixels lie more than two \
+                                   light elements from it. Is each photograph that of its bit, none exchanged with its inverse, \
+                                   and is the object nearly flat?";
+
+/// Whether a fit is so bad that the Gray code must be wrong.
+pub fn is_implausible(fit: &GrayCodeFit) -> bool {
+    (fit.residual).is_some_and(|residual| residual.median > MAX_RESIDUAL)
+}
 
 /// Find the correspondence of a capture from its Gray code, report how well it fits, and write it into capture.json
 #[derive(Debug, Args)]
@@ -27,11 +41,11 @@ pub struct CalibrateArgs {
     /// Capture folder
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Draw the map: how far the correspondence bends from its affine part, along the display's columns in red and along
-    /// its rows in green
+    /// Draw how far the correspondence bends from its affine part, along the display's columns in red and along its rows in
+    /// green: half bright is nothing, black and full brightness are the largest displacement to either side
     #[arg(long, value_name = "FILE.png")]
     map: Option<PathBuf>,
-    /// Replace the correspondence that capture.json has
+    /// Replace the correspondence that capture.json has, and write one that hardly fits
     #[arg(long)]
     force: bool,
     /// Print one JSON object on standard output
@@ -75,10 +89,17 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     let folder = CaptureFolder::open(&args.folder)?;
     let (manifest, path) = (folder.manifest(), folder.manifest_path());
     ensure!(
+        !manifest.graycode.is_empty(),
+        "{}: has no \"graycode\"; photograph the Gray code, or give \"correspondence\"",
+        path.display()
+    );
+    ensure!(
         manifest.correspondence.is_none() || args.force,
         "{}: has a \"correspondence\" already; --force replaces it",
         path.display()
     );
+    let map = args.map.as_ref();
+    let map = map.map(|path| OutputFile::create(path, &PNG)).transpose()?;
     let spinner = progress::spinner("decoding Gray code");
     let dark = folder.read_dark()?;
     let camera = manifest.camera.extent();
@@ -87,7 +108,12 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
         .fit(camera)
         .with_context(|| path.display().to_string())?;
     drop(spinner);
-    if let Some(map) = &args.map {
+    ensure!(
+        args.force || !is_implausible(&fit),
+        "{}: {IMPLAUSIBLE_FIT}. --force writes it nevertheless",
+        path.display()
+    );
+    if let Some(map) = map {
         draw_map(map, camera, &fit.correspondence)?;
     }
     write_correspondence(&path, &fit.correspondence)?;
@@ -109,7 +135,8 @@ fn rows(manifest: &Manifest) -> CameraRowSet {
     let Extent { width, height } = manifest.camera.extent();
     let row_bytes = u64::from(width) * (CHANNELS * size_of::<f32>()) as u64;
     let photographs = manifest.graycode.len().max(1) as u64;
-    let count = (MAX_GRAY_CODE_BYTES / (row_bytes * photographs)).clamp(1, height.into());
+    let row_bytes = row_bytes * photographs + u64::from(width) * POSITION_BYTES;
+    let count = (MAX_GRAY_CODE_BYTES / row_bytes).clamp(1, height.into());
     let row = |i: u64| (i * u64::from(height) / count) as u32;
     CameraRowSet::from_strips((0..count).map(|i| row(i)..row(i) + 1))
 }
@@ -149,7 +176,7 @@ fn largest_displacement(correspondence: &Correspondence) -> f64 {
 }
 
 /// Draws the displacement of every camera pixel, grey where there is none.
-fn draw_map(path: &Path, camera: Extent, correspondence: &Correspondence) -> Result<()> {
+fn draw_map(output: OutputFile, camera: Extent, correspondence: &Correspondence) -> Result<()> {
     let affine = Correspondence::from_affine(correspondence.affine);
     let largest = largest_displacement(correspondence).max(f64::MIN_POSITIVE);
     let code = |d: f64| (127.5 + 127.5 * d / largest).round() as u8;
@@ -159,7 +186,6 @@ fn draw_map(path: &Path, camera: Extent, correspondence: &Correspondence) -> Res
         [code(bent.u - straight.u), code(bent.v - straight.v), 128]
     });
     let pixels: Vec<[u8; CHANNELS]> = pixels.collect();
-    let output = OutputFile::create(path, &PNG)?;
     output.finish(|out| {
         PngEncoder::new(out)
             .write_image(
@@ -208,7 +234,9 @@ impl Serialize for ObjectText {
 fn write_correspondence(path: &Path, correspondence: &Correspondence) -> Result<()> {
     let write = || -> Result<()> {
         let json = std::fs::read_to_string(path)?;
-        let mut manifest: ObjectText = serde_json::from_str(&json)?;
+        // Some editors write a byte order mark.
+        let json = json.strip_prefix('\u{feff}').unwrap_or(&json);
+        let mut manifest: ObjectText = serde_json::from_str(json)?;
         manifest.0.retain(|(name, _)| name != "correspondence");
         let text = RawValue::from_string(serde_json::to_string(correspondence)?)?;
         manifest.0.push(("correspondence".to_owned(), text));

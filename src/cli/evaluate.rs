@@ -205,7 +205,9 @@ impl EvaluateReport {
         let decibels = |name: &str, value: Option<Decibels>| {
             line(name, &value.map_or("-".to_owned(), |db| db.to_string()))
         };
-        decibels("SNR of the transport", self.snr_db)?;
+        if self.snr_db.is_some() {
+            decibels("SNR of the transport", self.snr_db)?;
+        }
         let heldout = format!("SNR on {} held-out shots", self.heldout_shots);
         decibels(&heldout, self.heldout_snr_db)?;
         decibels("  with exposures fitted", self.heldout_fitted_snr_db)?;

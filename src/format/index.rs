@@ -88,6 +88,15 @@ impl FileIndex {
         metadata: &Metadata,
     ) -> Result<(Self, Vec<u8>), FormatError> {
         let directory = compress(&directory::encode(&scans, &entries))?;
+        if extensions
+            .iter()
+            .any(|extension| extension.tag == displacement::TAG)
+        {
+            return Err(FormatError::DamagedSection {
+                section: SectionName::Extensions,
+                reason: "the tag DISP is that of the geometry's displacement".to_owned(),
+            });
+        }
         let displacement = geometry.correspondence.displacement.as_ref();
         let displacement = displacement
             .map(|grid| displacement::encode(grid))

@@ -32,8 +32,11 @@ pub(super) fn index_bytes(header: &Header) -> u64 {
     let area = header.geometry.window.area();
     let entry = (size_of::<ChunkEntry>() + size_of::<u64>()) as u64 + STATE_BYTES;
     let basis = 4 * basis_chunk::content_bytes(header.rank.into(), area) as u64;
+    let displacement = header.geometry.correspondence.displacement.as_ref();
+    let control_points = displacement.map_or(0, |grid| grid.codes().len());
     relight_bytes(header)
         + header.index_bytes()
+        + (control_points * size_of::<[i16; 2]>()) as u64
         + directory::content_bytes(header)
         + scans * ((tiles + 1) * entry + size_of::<ProgressiveScan>() as u64)
         + tiles * TILE_STATE_BYTES

@@ -6,8 +6,8 @@ use crate::transport::{Correspondence, DisplacementGrid, Extent, GeometryError};
 
 /// Camera pixels between control points.
 const SPACING: u32 = DisplacementGrid::MIN_SPACING;
-/// Light elements of a code of 1.
-const STEP: f32 = 1.0 / 512.0;
+/// Least step of a code, in light elements.
+const MIN_STEP: f64 = 1.0 / 512.0;
 /// Distance of the camera, in half widths of the object.
 const DISTANCE: f64 = 3.0;
 
@@ -38,21 +38,26 @@ impl CameraView {
             return Ok(correspondence);
         }
         let points = DisplacementGrid::points_over(camera, SPACING);
-        let codes = points.cells().map(|(i, j)| {
+        let displacement = |(i, j): (u32, u32)| {
             let straight = [i, j].map(|i| f64::from(i * SPACING));
-            let seen = self.seen(camera, straight);
-            [0, 1].map(|axis| {
-                let scale = [across, down][axis];
-                ((seen[axis] - straight[axis]) * scale / f64::from(STEP)).round() as i16
-            })
-        });
-        let grid = DisplacementGrid::new(SPACING, STEP, points, codes.collect())?;
+            let undistorted = self.undistorted(camera, straight);
+            [0, 1].map(|axis| (undistorted[axis] - straight[axis]) * [across, down][axis])
+        };
+        let displacements: Vec<[f64; 2]> = points.cells().map(displacement).collect();
+        let largest = displacements
+            .as_flattened()
+            .iter()
+            .fold(0.0, |max: f64, d| max.max(d.abs()));
+        let step = MIN_STEP.max(1.001 * largest / f64::from(i16::MAX)) as f32;
+        let code = |d: f64| (d / f64::from(step)).round() as i16;
+        let codes = displacements.into_iter().map(|d| d.map(code));
+        let grid = DisplacementGrid::new(SPACING, step, points, codes.collect())?;
         correspondence.displacement = Some(Arc::new(grid));
         Ok(correspondence)
     }
 
-    /// Where an undistorted camera that looks straight sees what this one sees at a camera position.
-    fn seen(self, camera: Extent, at: [f64; 2]) -> [f64; 2] {
+    /// The position at which a camera without distortion or tilt would see the point that this camera sees at `at`.
+    fn undistorted(self, camera: Extent, at: [f64; 2]) -> [f64; 2] {
         let half = [camera.width, camera.height].map(|side| f64::from(side) / 2.0);
         let diagonal = half[0].hypot(half[1]);
         let [x, y] = [0, 1].map(|axis| at[axis] - half[axis]);
@@ -80,11 +85,12 @@ mod tests {
             distortion: 0.05,
             tilt: 0.0,
         };
-        near(view.seen(camera, [0.0, 0.0]), [0.0, 0.0]);
-        near(view.seen(camera, [32.0, 24.0]), [32.0, 24.0]);
+        near(view.undistorted(camera, [0.0, 0.0]), [0.0, 0.0]);
+        near(view.undistorted(camera, [32.0, 24.0]), [32.0, 24.0]);
         let tilted = CameraView { tilt: 10.0, ..view };
-        near(tilted.seen(camera, [32.0, 24.0]), [32.0, 24.0]);
-        let [left, right] = [0.0, 64.0].map(|x| (tilted.seen(camera, [x, 24.0])[0] - 32.0).abs());
+        near(tilted.undistorted(camera, [32.0, 24.0]), [32.0, 24.0]);
+        let [left, right] =
+            [0.0, 64.0].map(|x| (tilted.undistorted(camera, [x, 24.0])[0] - 32.0).abs());
         assert!(left > right + 2.0, "{left} {right}");
         let straight = CameraView::default()
             .correspondence(camera, camera)

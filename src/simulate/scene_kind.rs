@@ -37,7 +37,7 @@ impl SceneKind {
         })
     }
 
-    /// The rose window, seen as `view` lets see it. Cookies are seen straight only.
+    /// The rose window with the distortion and tilt of `view`. Cookies have neither.
     ///
     /// # Errors
     /// As [`build`](Self::build).

@@ -29,7 +29,7 @@ pub trait SimulatedScene: Sync {
     }
 }
 
-/// The geometry of a scene: the light plane fills the camera's picture, as `view` lets see it.
+/// The geometry of a scene: the light plane fills the camera's picture but for the distortion and tilt of `view`.
 ///
 /// # Errors
 /// [`GeometryError`] for extents of zero, too large, or smaller than the window.

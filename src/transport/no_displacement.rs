@@ -26,7 +26,7 @@ impl DisplacementGrid {
     }
 
     pub fn points_over(_: Extent, _: u32) -> Extent {
-        Extent::new(0, 0)
+        Extent::new(1, 1) // more than `MAX_POINTS`
     }
 
     pub fn fits(&self, _: Extent) -> bool {

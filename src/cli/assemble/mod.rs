@@ -1,5 +1,6 @@
 //! `ltm-export assemble`: pairs photographs with the pictures of a sequence, and makes a capture folder of them.
 
+mod level_warnings;
 mod photograph_file;
 mod photograph_list;
 
@@ -11,6 +12,7 @@ use image::ExtendedColorType;
 use rayon::prelude::*;
 use tempfile::TempDir;
 
+pub use self::level_warnings::{PhotographLevels, warn_of_clipping};
 use self::photograph_file::DevelopedPhotograph;
 pub use self::photograph_file::{DevelopSettings, SampleKind, develop};
 pub use self::photograph_list::photographs;
@@ -37,10 +39,6 @@ pub const MAX_READERS: usize = 4;
 const GRAY_CODE_ROWS: u32 = 64;
 /// Most faults that are listed.
 const MAX_LISTED: usize = 5;
-/// Share of the samples of the flood photograph that may be saturated.
-const MAX_SATURATED: f64 = 0.001;
-/// Share of the samples of a photograph that may be too far below black for a code.
-const MAX_CLIPPED: f64 = 0.001;
 /// Brightness of the brightest part of the flood photograph, relative to white, below which noise is needlessly high.
 const MIN_FLOOD: f64 = 0.3;
 /// Change of the reference photographs' brightness that is worth a note.
@@ -159,7 +157,8 @@ pub fn run(args: &AssembleArgs) -> Result<()> {
         .iter()
         .for_each(|fault| eprintln!("warning: {fault}"));
     session.note_exposure();
-    session.warn_of_clipping();
+    let paths = session.paths.iter().map(PathBuf::as_path);
+    warn_of_clipping(session.levels.iter().zip(paths));
     let response = session.display_response();
     let manifest = session.sequence.manifest(session.camera.clone(), response);
     session.move_into_place(&args.folder, &manifest)?;
@@ -219,10 +218,8 @@ struct Session {
     /// Holds the developed photographs, by their numbers.
     developed: TempDir,
     brightness: SequenceBrightness,
-    saturated_shares: Vec<f64>,
-    clipped_shares: Vec<f64>,
-    /// Of each photograph, the sample below white at which many pile up.
-    piles: Vec<Option<f64>>,
+    /// One for each photograph.
+    levels: Vec<PhotographLevels>,
 }
 
 impl Session {
@@ -297,9 +294,7 @@ impl Session {
             paths,
             camera,
             developed,
-            saturated_shares: photos.iter().map(|photo| photo.saturated_share).collect(),
-            clipped_shares: photos.iter().map(|photo| photo.clipped_share).collect(),
-            piles: photos.iter().map(|photo| photo.pile).collect(),
+            levels: photos.iter().map(PhotographLevels::of).collect(),
             brightness: SequenceBrightness {
                 thumbnails: photos.into_iter().map(|photo| photo.thumbnail).collect(),
             },
@@ -388,22 +383,6 @@ impl Session {
         found.map(|(i, _)| i).collect()
     }
 
-    /// Warns of the photograph with most samples too far below black, if they are many.
-    fn warn_of_clipping(&self) {
-        let shares = self.clipped_shares.iter().enumerate();
-        let Some((i, share)) = shares.max_by(|a, b| a.1.total_cmp(b.1)) else {
-            return;
-        };
-        if *share > MAX_CLIPPED {
-            eprintln!(
-                "warning: {:.1} % of the samples of {} are below black by more than 3 % of white, and are clipped; is --black \
-                 right?",
-                100.0 * share,
-                self.path(i)
-            );
-        }
-    }
-
     /// Notes exposures that cost accuracy, and a lamp that drifts.
     fn note_exposure(&self) {
         let thumbnail = |i: &usize| &self.brightness.thumbnails[*i];
@@ -416,24 +395,13 @@ impl Session {
             .sum();
         for flood in &floods {
             let brightest = thumbnail(flood).iter().copied().fold(0.0, f64::max);
-            let saturated = self.saturated_shares[*flood];
-            if saturated > MAX_SATURATED {
-                eprintln!(
-                    "warning: {:.1} % of the samples of {} are saturated; expose less, unless --white is wrong",
-                    100.0 * saturated,
-                    self.path(*flood)
-                );
-            } else if brightest < MIN_FLOOD {
+            let levels = &self.levels[*flood];
+            levels.warn_of_flood(&self.paths[*flood]);
+            if !levels.is_saturated() && brightest < MIN_FLOOD {
                 eprintln!(
                     "note: the brightest part of {} is at {:.0} % of white; more exposure would lower the noise",
                     self.path(*flood),
                     100.0 * brightest
-                );
-            }
-            if let Some(pile) = self.piles[*flood] {
-                eprintln!(
-                    "warning: many samples of {} are exactly {pile}, as if the camera saturated there: then --white is {pile}",
-                    self.path(*flood)
                 );
             }
             let references = self.photos_of(|role| *role == PictureRole::Reference);

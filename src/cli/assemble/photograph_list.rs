@@ -59,12 +59,12 @@ fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     }
     ensure!(
         !files.is_empty(),
-        "has no raw, PNG, TIFF or OpenEXR files; photographs are 16-bit linear (docs/shooting.md says how)"
+        "has no raw, PNG, TIFF or OpenEXR files (docs/shooting.md says which are read)"
     );
     // A camera that saves both writes JPEG beside raw, but converted photographs may lie beside them.
     ensure!(
         files.iter().all(|file| is_raw(file)) || files.iter().all(|file| is_picture(file)),
-        "has raw files beside PNG, TIFF or OpenEXR files; move one kind out, or name the files of the other after --photos"
+        "has raw files beside PNG, TIFF or OpenEXR files; move one kind out, or name the files of the other instead of the folder"
     );
     let name = |file: &PathBuf| {
         file.file_name()

@@ -203,7 +203,12 @@ pub fn duplicates(folder: &CaptureFolder, scanned: &ScannedCapture<'_>) -> Vec<F
         let group = read.iter().zip(&ids).filter(|(_, own)| **own == id);
         let group: Vec<ListedPhotograph<'_>> =
             group.map(|((photograph, _), _)| *photograph).collect();
-        if group.len() < 2 {
+        // Gray code may serve as patterns too: a file is listed as a shot and as a bit.
+        let is_file_of_both = group.len() == 2
+            && group[0].name == group[1].name
+            && (group.iter()).any(|other| matches!(other.role, PhotographRole::Shot(_)))
+            && (group.iter()).any(|other| matches!(other.role, PhotographRole::GrayCode(_)));
+        if group.len() < 2 || is_file_of_both {
             continue;
         }
         // What each should show.

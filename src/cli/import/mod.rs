@@ -9,8 +9,10 @@ use image::{ExtendedColorType, ImageReader, Limits};
 use rayon::prelude::*;
 
 use super::assemble::{
-    DevelopArgs, DevelopSettings, MAX_READERS, SampleKind, develop, fit_gray_code, photographs,
+    DevelopArgs, DevelopSettings, MAX_READERS, PhotographLevels, SampleKind, develop,
+    fit_gray_code, photographs, warn_of_clipping,
 };
+use super::calibrate::{IMPLAUSIBLE_FIT, is_implausible};
 use super::capture_writer::write_png;
 use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
 use super::{advice, output_folder, progress};
@@ -83,7 +85,16 @@ pub fn run(args: &ImportArgs) -> Result<()> {
         paths.len(),
         pictures.len()
     );
+    let cores = InterruptibleCores::listen()?;
     let roles = Roles::read(&pictures)?;
+    if !roles.has_gray_code() {
+        // Photographs have noise and edges, so that none is recognised.
+        let photos = Roles::read(&paths);
+        ensure!(
+            !photos.is_ok_and(|photos| photos.has_gray_code()),
+            "--photos names Gray code as a display shows it, and --patterns none: are they exchanged?"
+        );
+    }
     let light = ManifestLight::of_gamma(args.gamma);
     let mut summary = String::new();
     output_folder::write_atomically(&args.output, |folder| {
@@ -91,14 +102,18 @@ pub fn run(args: &ImportArgs) -> Result<()> {
             std::fs::create_dir(folder.join(name)).context(name)?;
         }
         let mut session = Session::new(roles, light, &pictures)?;
-        session.camera = session.write_photographs(folder, &paths, &settings)?;
-        session.element = match args.element {
-            Some(element) => element,
-            None => session.suitable_element(folder),
-        };
-        session.check_element(&pictures)?;
+        if let Some(element) = args.element {
+            session.element = element;
+            session.check_element(&pictures)?;
+        }
+        session.camera = session.write_photographs(folder, &paths, &settings, &cores)?;
+        if args.element.is_none() {
+            session.element = session.suitable_element(folder);
+        }
         let patterns = session.read_patterns(&pictures)?;
+        check_cancelled(&cores)?;
         session.write_patterns(folder, &patterns)?;
+        check_cancelled(&cores)?;
         session.remove_unused(folder, &patterns)?;
         write_manifest(folder, &session.manifest(&patterns))?;
         summary = session.summary(&patterns);
@@ -113,6 +128,10 @@ pub fn run(args: &ImportArgs) -> Result<()> {
         return Ok(());
     }
     match fit_gray_code(&args.output) {
+        Ok(fit) if is_implausible(&fit) => {
+            eprintln!("warning: {IMPLAUSIBLE_FIT}");
+            eprintln!("{output}: {summary}");
+        }
         Ok(_) => eprintln!("{output}: {summary}; `ltm-export recover` takes this folder"),
         Err(error) => {
             eprintln!("warning: {}", advice::error_with_remedy(&error));
@@ -125,13 +144,23 @@ pub fn run(args: &ImportArgs) -> Result<()> {
     Ok(())
 }
 
+fn check_cancelled(cores: &InterruptibleCores) -> Result<()> {
+    match cores.is_cancelled() {
+        true => bail!(Interrupted("interrupted: nothing is written".to_owned())),
+        false => Ok(()),
+    }
+}
+
 fn read_picture(path: &Path) -> Result<DisplayedPicture> {
     let read = || -> Result<DisplayedPicture> {
         let mut limits = Limits::default();
         limits.max_alloc = Some(MAX_PICTURE_BYTES);
         let mut reader = ImageReader::open(path)?.with_guessed_format()?;
         reader.limits(limits);
-        let picture = reader.decode().context("cannot be decoded")?.into_rgb8();
+        let picture = reader
+            .decode()
+            .context("cannot be decoded as PNG or TIFF")?
+            .into_rgb8();
         let (width, height) = picture.dimensions();
         Ok(DisplayedPicture {
             extent: Extent::new(width, height),
@@ -170,10 +199,18 @@ impl Roles {
         Ok(Self { roles, display })
     }
 
+    fn has_gray_code(&self) -> bool {
+        let is_gray_code = |role: &DisplayedRole| matches!(role, DisplayedRole::GrayCode(_));
+        self.roles.iter().any(is_gray_code)
+    }
+
     fn number_of(&self, role: DisplayedRole) -> Option<usize> {
         self.roles.iter().position(|other| *other == role)
     }
 }
+
+/// Size and levels of a photograph, its samples, and what it says of its levels.
+type WrittenPhotograph = (ManifestCamera, SampleKind, PhotographLevels);
 
 /// What a capture folder is made from. Numbers are those of pictures and their photographs.
 struct Session {
@@ -235,28 +272,27 @@ impl Session {
         folder: &Path,
         paths: &[PathBuf],
         settings: &DevelopSettings,
+        cores: &InterruptibleCores,
     ) -> Result<ManifestCamera> {
-        let cores = InterruptibleCores::listen()?;
         let bar = progress::bar("reading photographs", paths.len());
-        let write = |(i, path): (usize, &PathBuf)| -> Result<(ManifestCamera, SampleKind)> {
+        let write = |(i, path): (usize, &PathBuf)| -> Result<WrittenPhotograph> {
             let developed = develop(path, settings, folder);
             // An interruption ends the converter of raw files as well, which is no fault of the photograph.
-            if cores.is_cancelled() {
-                bail!(Interrupted("interrupted: nothing is written".to_owned()));
-            }
+            check_cancelled(cores)?;
             let developed = developed?;
             let bytes = bytemuck::cast_slice(&developed.codes);
             let target = folder.join(self.photo(i));
             let extent = developed.camera.extent();
             write_png(&target, extent, bytes, ExtendedColorType::Rgb16)?;
             bar.inc(1);
-            Ok((developed.camera, developed.kind))
+            let levels = PhotographLevels::of(&developed);
+            Ok((developed.camera, developed.kind, levels))
         };
         let threads = rayon::current_num_threads().min(MAX_READERS);
         let written = paths.par_iter().enumerate().map(write);
         let written = thread_pool(threads)?.install(|| written.collect::<Result<Vec<_>>>())?;
-        let (first, kind) = written.first().context("--photos names no photograph")?;
-        for ((camera, own_kind), path) in written.iter().zip(paths) {
+        let (first, kind, _) = written.first().context("--photos names no photograph")?;
+        for ((camera, own_kind, _), path) in written.iter().zip(paths) {
             ensure!(
                 camera.extent() == first.extent(),
                 "{}: has {} pixels, but {} has {}; photographs of one capture have one size",
@@ -272,12 +308,16 @@ impl Session {
                 paths[0].display()
             );
         }
+        let levels = written.iter().map(|(_, _, levels)| levels);
+        warn_of_clipping(levels.zip(paths.iter().map(PathBuf::as_path)));
+        if let Some(i) = self.flood {
+            written[i].2.warn_of_flood(&paths[i]);
+        }
         Ok(first.clone())
     }
 
-    /// The smallest side that the Gray code numbers; and, where Gray code is all there is, that gives an element
-    /// [`MIN_PIXELS`] camera pixels along a side. 1 without Gray code.
-    fn suitable_element(&mut self, folder: &Path) -> u32 {
+    /// The side of the smallest element that the Gray code numbers along both axes; `None` without Gray code.
+    fn finest_element(&self) -> Option<u32> {
         let finest_bit = |axis: LightPlaneAxis| {
             let bits = self
                 .gray_code
@@ -285,10 +325,17 @@ impl Session {
                 .filter(|(_, pattern)| pattern.axis == axis);
             bits.map(|(_, pattern)| pattern.bit).min()
         };
-        let [Some(x), Some(y)] = [LightPlaneAxis::X, LightPlaneAxis::Y].map(finest_bit) else {
+        let [x, y] = [LightPlaneAxis::X, LightPlaneAxis::Y].map(finest_bit);
+        Some(1 << x?.max(y?))
+    }
+
+    /// The smallest side that the Gray code numbers; and, where Gray code is all there is, that gives an element
+    /// [`MIN_PIXELS`] camera pixels along a side. 1 without Gray code.
+    fn suitable_element(&mut self, folder: &Path) -> u32 {
+        let Some(finest) = self.finest_element() else {
             return 1;
         };
-        self.element = 1 << x.max(y);
+        self.element = finest;
         // Other patterns have elements of their own.
         if self.roles.contains(&DisplayedRole::Pattern) {
             return self.element;
@@ -311,17 +358,21 @@ impl Session {
         element
     }
 
-    /// The Gray code of a number without its last bits is that of its first bits: elements are powers of two.
+    /// The Gray code of a number without its last bits is that of its first bits: elements are powers of two, and not smaller
+    /// than its finest bit tells apart.
     fn check_element(&self, pictures: &[PathBuf]) -> Result<()> {
-        if let Some((i, _)) = self.gray_code.first() {
-            ensure!(
-                self.element.is_power_of_two(),
-                "--element {}: {} is Gray code of display pixels, which numbers elements of 1, 2, 4, 8, … pixels only; give one \
-                 of these",
-                self.element,
-                pictures[*i].display()
-            );
-        }
+        let (Some((i, _)), Some(finest)) = (self.gray_code.first(), self.finest_element()) else {
+            return Ok(());
+        };
+        ensure!(
+            self.element.is_power_of_two() && self.element >= finest,
+            "--element {}: {} and others are Gray code that numbers elements of {finest}, {}, {}, … display pixels only; give one \
+             of these",
+            self.element,
+            pictures[*i].display(),
+            2 * finest,
+            4 * finest
+        );
         Ok(())
     }
 

@@ -134,7 +134,7 @@ impl FileDigest {
 /// from the same photographs, and its tiles would not fit.
 pub fn recovery_fingerprint(recovery: &PreparedRecovery) -> u32 {
     let geometry = recovery.geometry();
-    let affine = geometry.correspondence.affine.into_iter().flatten();
+    let correspondence = geometry.correspondence.to_numbers().into_iter();
     let common_mode = recovery.common_mode().map(|mode| mode.weight());
     let validation = recovery.holdout_validation();
     let snr = validation.and_then(HoldoutValidation::snr);
@@ -152,7 +152,7 @@ pub fn recovery_fingerprint(recovery: &PreparedRecovery) -> u32 {
         .flatten()
         .flat_map(u32::to_le_bytes)
         .chain(
-            affine
+            correspondence
                 .chain(chosen)
                 .chain(corrections)
                 .chain(left_out)

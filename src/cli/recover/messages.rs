@@ -444,10 +444,15 @@ pub fn capture_fault(
                 symmetry.of_correspondence(measurements.light, &measurements.correspondence);
             // Without negative zeros.
             let [u, v] = right.affine.map(|row| row.map(|value| value + 0.0));
-            format!(
-                "the correspondence is {kind}: the photographs follow from their patterns with \
-                 \"correspondence\": {{\"affine\": [{u:?}, {v:?}]}}"
-            )
+            match right.displacement {
+                None => format!(
+                    "the correspondence is {kind}: the photographs follow from their patterns with \
+                     \"correspondence\": {{\"affine\": [{u:?}, {v:?}]}}"
+                ),
+                Some(_) => format!(
+                    "the correspondence is {kind}; check the axes of \"graycode\", and give `ltm-export calibrate --force`"
+                ),
+            }
         }
         CaptureFault::Moved { first, shift } => format!(
             "{}: remove the shots before the move, or those after it{}",

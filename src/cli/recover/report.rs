@@ -8,11 +8,15 @@ use super::calibration::EstimatedField;
 use crate::capture::{CaptureFolder, Manifest, NoiseModel};
 use crate::cli::finding::Finding;
 use crate::cli::report::{format_bytes, format_shots, print_line};
+use crate::export::MIN_PLAUSIBLE_SNR;
 use crate::recover::{
     CommonModeWeight, MOVED_CODE, Method, PhotographCorrection, PhotographFault, PreparedRecovery,
     SparsityBasis,
 };
 use crate::transport::Decibels;
+
+/// SNR on held-out patterns from which on a result is good for any light.
+const MIN_GOOD_SNR: Decibels = Decibels(20.0);
 
 /// Fields of `recover --json`; see docs/capture.md.
 #[derive(Serialize)]
@@ -121,16 +125,49 @@ impl RecoverReport {
             self.seconds,
             format_bytes(self.file_bytes),
         ))?;
-        if let Some(snr) = self.expected_snr_db {
-            print_line(&format!(
-                "SNR of the recovered light transport: about {snr}, estimated on held-out patterns"
-            ))?;
-        }
-        if let Some(snr) = self.file_snr_db {
-            print_line(&format!(
-                "SNR of the file relative to the recovered light transport: {snr}"
-            ))?;
-        }
-        Ok(())
+        print_line(&verdict(self.expected_snr_db, self.file_snr_db))
+    }
+}
+
+/// What the result is worth: `expected` is the SNR of the recovered light transport, estimated on held-out patterns, and `file`
+/// that of the file relative to it.
+fn verdict(expected: Option<Decibels>, file: Option<Decibels>) -> String {
+    let Some(expected) = expected else {
+        return "unknown: with fewer than 20 patterns none is held out to test the result with"
+            .to_owned();
+    };
+    let word = match expected {
+        snr if snr < MIN_PLAUSIBLE_SNR => "poor",
+        snr if snr < MIN_GOOD_SNR => "fair",
+        _ => "good",
+    };
+    let error = |snr: Decibels| 10f64.powf(-snr.0 / 10.0);
+    let kept = file.map(|file| -10.0 * (error(expected) + error(file)).log10());
+    let loss = kept.map(|kept| match expected.0 - kept {
+        loss if loss < 0.05 => "; the file keeps all of it".to_owned(),
+        loss => format!("; the file keeps {loss:.1} dB less"),
+    });
+    format!(
+        "{word}: predicts patterns that it has not seen to about {:.1} dB{}",
+        expected.0,
+        loss.unwrap_or_default()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_says_what_the_file_costs() {
+        let said = |expected, file| verdict(Some(Decibels(expected)), Some(Decibels(file)));
+        assert_eq!(
+            said(33.0, 42.0),
+            "good: predicts patterns that it has not seen to about 33.0 dB; the file keeps 0.5 dB less"
+        );
+        assert!(said(16.0, 60.0).starts_with("fair"));
+        assert!(said(16.0, 60.0).ends_with("the file keeps all of it"));
+        assert!(said(3.0, 20.0).starts_with("poor"));
+        assert!(verdict(None, Some(Decibels(40.0))).starts_with("unknown"));
     }
 }

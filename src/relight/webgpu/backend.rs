@@ -133,9 +133,9 @@ mod tests {
             tile_side: 8,
         };
         let transport = Transport {
-            geometry,
-            basis: Basis::default(),
             tiles: vec![Tile::dark(geometry.tile(0))],
+            basis: Basis::default(),
+            geometry,
         };
         let document = web_sys::window().unwrap().document().unwrap();
         let canvas = document.create_element("canvas").unwrap().unchecked_into();
