@@ -2,30 +2,16 @@
 #![cfg(not(target_arch = "wasm32"))]
 #![allow(clippy::unwrap_used)] // a panic fails the test
 
-mod common;
+mod session;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::Value;
 use tempfile::TempDir;
 
-fn run(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
-    command.args(arguments).output().unwrap()
-}
-
-fn stderr_text(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn succeed(arguments: &[&str]) -> Output {
-    let output = run(arguments);
-    let error = stderr_text(&output);
-    assert!(output.status.success(), "{arguments:?}: {error}");
-    output
-}
+use session::{Session, run, stderr_text, succeed};
 
 fn fail(arguments: &[&str]) -> String {
     let output = run(arguments);
@@ -56,55 +42,13 @@ fn snr(file: &str, capture: &str) -> f64 {
 }
 
 /// A session of a display of 128 × 128 pixels: its pictures and its photographs.
-struct Session {
-    folder: TempDir,
-}
-
-impl Session {
-    fn new() -> Self {
-        let session = Self {
-            folder: TempDir::new().unwrap(),
-        };
-        let [object, sequence, photos] =
-            ["object", "sequence", "photos"].map(|name| session.text(name));
-        let size = ["--camera", "48x48", "--light", "32x32"];
-        let simulate = [
-            "simulate",
-            "stained-glass",
-            "-o",
-            &object,
-            "--patterns",
-            "1",
-        ];
-        succeed(&[&simulate[..], &size].concat());
-        let display = [
-            "--screen",
-            "128x128",
-            "--light",
-            "32x32",
-            "--patterns",
-            "40",
-        ];
-        succeed(&[&["patterns", "-o", &sequence][..], &display].concat());
-        succeed(&[
-            "photograph",
-            &object,
-            "--sequence",
-            &sequence,
-            "-o",
-            &photos,
-        ]);
-        session
-    }
-
-    fn text(&self, name: &str) -> String {
-        self.folder.path().join(name).to_str().unwrap().to_owned()
-    }
+fn session() -> Session {
+    Session::of("32x32", "128x128", "40")
 }
 
 #[test]
 fn a_session_of_another_program_is_imported_calibrated_and_recovered() {
-    let session = Session::new();
+    let session = session();
     let [pictures, photos] = ["sequence/display", "photos"].map(|name| session.text(name));
     let [capture, file] = ["capture", "file.ltm"].map(|name| session.text(name));
     let from = ["--patterns", &pictures, "--photos", &photos];
@@ -132,7 +76,7 @@ fn a_session_of_another_program_is_imported_calibrated_and_recovered() {
 
 #[test]
 fn imports_that_cannot_be_right_are_refused() {
-    let session = Session::new();
+    let session = session();
     let [pictures, photos] = ["sequence/display", "photos"].map(|name| session.text(name));
     let capture = session.text("capture");
     let import = |options: &[&str]| {

@@ -35,43 +35,23 @@ pub struct Session {
 
 impl Session {
     pub fn new() -> Self {
+        Self::of("24x24", "200x150", "48")
+    }
+
+    /// Of so many light elements, display pixels and patterns.
+    pub fn of(light: &str, screen: &str, patterns: &str) -> Self {
         let session = Self {
             folder: TempDir::new().unwrap(),
         };
         let [object, sequence, photos] =
             ["object", "sequence", "photos"].map(|name| session.text(name));
-        let size = ["--camera", "48x48", "--light", "24x24"];
-        succeed(
-            &[
-                &[
-                    "simulate",
-                    "stained-glass",
-                    "-o",
-                    &object,
-                    "--patterns",
-                    "1",
-                ],
-                &size[..],
-            ]
-            .concat(),
-        );
-        let display = [
-            "--screen",
-            "200x150",
-            "--light",
-            "24x24",
-            "--patterns",
-            "48",
-        ];
+        let simulate = ["simulate", "stained-glass", "-o", &object];
+        let size = ["--camera", "48x48", "--light", light, "--patterns", "1"];
+        succeed(&[&simulate[..], &size].concat());
+        let display = ["--screen", screen, "--light", light, "--patterns", patterns];
         succeed(&[&["patterns", "-o", &sequence], &display[..]].concat());
-        succeed(&[
-            "photograph",
-            &object,
-            "--sequence",
-            &sequence,
-            "-o",
-            &photos,
-        ]);
+        let photograph = ["photograph", &object, "--sequence", &sequence];
+        succeed(&[&photograph[..], &["-o", &photos]].concat());
         session
     }
 

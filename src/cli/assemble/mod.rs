@@ -1,5 +1,6 @@
 //! `ltm-export assemble`: pairs photographs with the pictures of a sequence, and makes a capture folder of them.
 
+mod develop_all;
 mod level_warnings;
 mod photograph_file;
 mod photograph_list;
@@ -8,17 +9,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use image::ExtendedColorType;
-use rayon::prelude::*;
 use tempfile::TempDir;
 
+pub use self::develop_all::{check_cancelled, develop_all};
 pub use self::level_warnings::{PhotographLevels, warn_of_clipping};
-use self::photograph_file::DevelopedPhotograph;
-pub use self::photograph_file::{DevelopSettings, SampleKind, develop};
+pub use self::photograph_file::DevelopSettings;
 pub use self::photograph_list::photographs;
 use super::advice::error_with_remedy;
-use super::capture_writer::write_png;
-use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
+use super::process_resources::InterruptibleCores;
 use super::progress;
 use super::value_parsers::UsageError;
 use crate::acquisition::{
@@ -28,13 +26,10 @@ use crate::calibrate::GrayCodeFit;
 use crate::capture::{
     CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME, Manifest, ManifestCamera,
 };
-use crate::job_executor::Executor;
 use crate::transport::{Extent, TileRect};
 
 /// Folders that photographs are written into.
 const FOLDERS: [&str; 2] = ["photos", "graycode"];
-/// Photographs that are in memory at once.
-pub const MAX_READERS: usize = 4;
 /// Rows of the Gray code that are decoded, at most.
 const GRAY_CODE_ROWS: u32 = 64;
 /// Most faults that are listed.
@@ -235,68 +230,20 @@ impl Session {
             std::fs::create_dir(developed.path().join(folder)).context(folder)?;
         }
         let cores = InterruptibleCores::listen()?;
-        let bar = progress::bar("reading", paths.len());
-        let read = |(i, path): (usize, &PathBuf)| -> Result<DevelopedPhotograph> {
-            if cores.is_cancelled() {
-                bail!(Interrupted("interrupted: nothing is written".to_owned()));
-            }
-            let developed_photo = develop(path, settings, developed.path());
-            // An interruption ends the converter of raw files as well, which is no fault of the photograph.
-            if developed_photo.is_err() && cores.is_cancelled() {
-                bail!(Interrupted("interrupted: nothing is written".to_owned()));
-            }
-            let mut photo = developed_photo?;
-            let bytes = bytemuck::cast_slice(&photo.codes);
+        let name = |i: usize| {
             // A photograph too many has no name.
-            if let Some(picture) = sequence.pictures.get(i) {
-                let target = developed.path().join(&picture.photo);
-                write_png(
-                    &target,
-                    photo.camera.extent(),
-                    bytes,
-                    ExtendedColorType::Rgb16,
-                )?;
-            }
-            photo.codes = Vec::new();
-            bar.inc(1);
-            Ok(photo)
+            let picture = sequence.pictures.get(i)?;
+            Some(picture.photo.clone())
         };
-        // Each thread holds a whole photograph.
-        let threads = rayon::current_num_threads().min(MAX_READERS);
-        let photos = paths.par_iter().enumerate().map(read);
-        let photos = thread_pool(threads)?
-            .install(|| photos.collect::<Result<Vec<DevelopedPhotograph>>>())?;
-        drop(bar);
-        let first = photos.first().context("--photos names no photograph")?;
-        let (camera, kind) = (first.camera.clone(), first.kind);
-        let extent = camera.extent();
-        if let Some(i) = photos
-            .iter()
-            .position(|photo| photo.camera.extent() != extent)
-        {
-            bail!(
-                "{}: has {} pixels, but {} has {extent}; photographs of one capture have one size",
-                paths[i].display(),
-                photos[i].camera.extent(),
-                paths[0].display()
-            );
-        }
-        if let Some(i) = photos.iter().position(|photo| photo.kind != kind) {
-            bail!(
-                "{}: has {}, but {} has {kind}; export all photographs alike",
-                paths[i].display(),
-                photos[i].kind,
-                paths[0].display()
-            );
-        }
+        let photos = develop_all(&paths, settings, developed.path(), name, &cores)?;
         Ok(Self {
             sequence,
             paths,
-            camera,
+            camera: photos.camera,
             developed,
-            levels: photos.iter().map(PhotographLevels::of).collect(),
+            levels: photos.levels,
             brightness: SequenceBrightness {
-                thumbnails: photos.into_iter().map(|photo| photo.thumbnail).collect(),
+                thumbnails: photos.thumbnails,
             },
         })
     }

@@ -208,14 +208,6 @@ impl PhotographSource for &ScannedCapture<'_> {
         self.cores
     }
 
-    fn read_by(&self, sample: CaptureSample<()>, manifest: Manifest) -> Result<CaptureSample<()>> {
-        if *sample.folder.manifest() == manifest {
-            return Ok(sample);
-        }
-        let shots = sample.shots.clone();
-        self.read_shots(sample, shots, manifest)
-    }
-
     fn read_shots(
         &self,
         sample: CaptureSample<()>,

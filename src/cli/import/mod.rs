@@ -9,19 +9,18 @@ use image::{ExtendedColorType, ImageReader, Limits};
 use rayon::prelude::*;
 
 use super::assemble::{
-    DevelopArgs, DevelopSettings, MAX_READERS, PhotographLevels, SampleKind, develop,
-    fit_gray_code, photographs, warn_of_clipping,
+    DevelopArgs, DevelopSettings, check_cancelled, develop_all, fit_gray_code, photographs,
+    warn_of_clipping,
 };
 use super::calibrate::{IMPLAUSIBLE_FIT, is_implausible};
 use super::capture_writer::write_png;
-use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
+use super::process_resources::InterruptibleCores;
 use super::{advice, output_folder, progress};
 use crate::acquisition::{DisplayedPicture, DisplayedRole};
 use crate::calibrate::{GrayCodeFit, LightPlaneAxis};
 use crate::capture::{
     CaptureFolder, GrayCodeShot, MANIFEST_NAME, Manifest, ManifestCamera, ManifestLight, Shot,
 };
-use crate::job_executor::Executor;
 use crate::simulate::GrayCodePattern;
 use crate::transport::{CHANNELS, Extent};
 
@@ -144,13 +143,6 @@ pub fn run(args: &ImportArgs) -> Result<()> {
     Ok(())
 }
 
-fn check_cancelled(cores: &InterruptibleCores) -> Result<()> {
-    match cores.is_cancelled() {
-        true => bail!(Interrupted("interrupted: nothing is written".to_owned())),
-        false => Ok(()),
-    }
-}
-
 fn read_picture(path: &Path) -> Result<DisplayedPicture> {
     let read = || -> Result<DisplayedPicture> {
         let mut limits = Limits::default();
@@ -208,9 +200,6 @@ impl Roles {
         self.roles.iter().position(|other| *other == role)
     }
 }
-
-/// Size and levels of a photograph, its samples, and what it says of its levels.
-type WrittenPhotograph = (ManifestCamera, SampleKind, PhotographLevels);
 
 /// What a capture folder is made from. Numbers are those of pictures and their photographs.
 struct Session {
@@ -274,46 +263,13 @@ impl Session {
         settings: &DevelopSettings,
         cores: &InterruptibleCores,
     ) -> Result<ManifestCamera> {
-        let bar = progress::bar("reading photographs", paths.len());
-        let write = |(i, path): (usize, &PathBuf)| -> Result<WrittenPhotograph> {
-            let developed = develop(path, settings, folder);
-            // An interruption ends the converter of raw files as well, which is no fault of the photograph.
-            check_cancelled(cores)?;
-            let developed = developed?;
-            let bytes = bytemuck::cast_slice(&developed.codes);
-            let target = folder.join(self.photo(i));
-            let extent = developed.camera.extent();
-            write_png(&target, extent, bytes, ExtendedColorType::Rgb16)?;
-            bar.inc(1);
-            let levels = PhotographLevels::of(&developed);
-            Ok((developed.camera, developed.kind, levels))
-        };
-        let threads = rayon::current_num_threads().min(MAX_READERS);
-        let written = paths.par_iter().enumerate().map(write);
-        let written = thread_pool(threads)?.install(|| written.collect::<Result<Vec<_>>>())?;
-        let (first, kind, _) = written.first().context("--photos names no photograph")?;
-        for ((camera, own_kind, _), path) in written.iter().zip(paths) {
-            ensure!(
-                camera.extent() == first.extent(),
-                "{}: has {} pixels, but {} has {}; photographs of one capture have one size",
-                path.display(),
-                camera.extent(),
-                paths[0].display(),
-                first.extent()
-            );
-            ensure!(
-                own_kind == kind,
-                "{}: has {own_kind}, but {} has {kind}; export all photographs alike",
-                path.display(),
-                paths[0].display()
-            );
-        }
-        let levels = written.iter().map(|(_, _, levels)| levels);
-        warn_of_clipping(levels.zip(paths.iter().map(PathBuf::as_path)));
+        let name = |i: usize| Some(self.photo(i));
+        let photos = develop_all(paths, settings, folder, name, cores)?;
+        warn_of_clipping(photos.levels.iter().zip(paths.iter().map(PathBuf::as_path)));
         if let Some(i) = self.flood {
-            written[i].2.warn_of_flood(&paths[i]);
+            photos.levels[i].warn_of_flood(&paths[i]);
         }
-        Ok(first.clone())
+        Ok(photos.camera)
     }
 
     /// The side of the smallest element that the Gray code numbers along both axes; `None` without Gray code.

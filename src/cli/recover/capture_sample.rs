@@ -23,12 +23,18 @@ pub trait PhotographSource {
     /// What runs jobs, and may be cancelled.
     fn cores(&self) -> &InterruptibleCores;
 
-    /// The same photographs by another manifest.
+    /// The same photographs by another manifest. They are not read again if they were read by that.
     fn read_by(
         &self,
         sample: CaptureSample<Self::Dark>,
         manifest: Manifest,
-    ) -> Result<CaptureSample<Self::Dark>>;
+    ) -> Result<CaptureSample<Self::Dark>> {
+        if *sample.folder.manifest() == manifest {
+            return Ok(sample);
+        }
+        let shots = sample.shots.clone();
+        self.read_shots(sample, shots, manifest)
+    }
 
     /// The photographs of other shots by another manifest.
     fn read_shots(
@@ -96,15 +102,6 @@ impl PhotographSource for SampleSource<'_> {
 
     fn cores(&self) -> &InterruptibleCores {
         self.cores
-    }
-
-    /// Reads them unless they were read by that manifest. Frees their memory before.
-    fn read_by(&self, sample: CaptureSample, manifest: Manifest) -> Result<CaptureSample> {
-        if *sample.folder.manifest() == manifest {
-            return Ok(sample);
-        }
-        let shots = sample.shots.clone();
-        self.read_shots(sample, shots, manifest)
     }
 
     /// Reads them. Frees the memory of the others before.
