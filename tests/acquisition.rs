@@ -190,7 +190,7 @@ fn wrong_input_is_named_with_its_remedy() {
     let output = session.assemble(&[]);
     let message = stderr_text(&output);
     assert!(
-        message.contains("photos: is there already, but assemble writes"),
+        message.contains("photos: is there already, but photos/, graycode/ and"),
         "{message}"
     );
 }
@@ -319,4 +319,78 @@ fn the_player_has_the_sequence_and_the_pictures_have_whole_elements() {
         }
     }
     assert!(!player.contains("/* player."));
+}
+
+/// The stand-in for a camera that `ltm-export shoot` releases.
+#[test]
+fn one_picture_is_photographed_as_in_its_sequence() {
+    let session = Session::new();
+    let [object, sequence, photo] =
+        ["object", "sequence", "one.png"].map(|name| session.text(name));
+    // The first random pattern.
+    let picture = session.text("sequence/display/0030-pattern-0000.png");
+    let start = ["photograph", &object, "--sequence", &sequence];
+    let photograph = |picture: &str, exposure: &str| {
+        let options = ["--picture", picture, "-o", &photo, "--exposure", exposure];
+        run(&[&start[..], &options, &["--seed", "7"]].concat())
+    };
+    let mean = |path: &std::path::Path| {
+        let samples = image::open(path).unwrap().into_rgb16().into_raw();
+        let sum: f64 = samples.iter().map(|code| f64::from(*code) - 512.0).sum();
+        sum / samples.len() as f64
+    };
+    assert!(photograph(&picture, "1/15").status.success());
+    let own = mean(&session.path("one.png"));
+    let listed = mean(&session.photo(30));
+    assert!((own / listed - 1.0).abs() < 0.01, "{own} {listed}");
+    assert!(photograph(&picture, "1/30").status.success());
+    let half = mean(&session.path("one.png"));
+    assert!((half / own - 0.5).abs() < 0.01, "{half}");
+    let other = session.text("sequence/patterns/0000.png");
+    let message = stderr_text(&photograph(&other, "1/15"));
+    assert!(
+        message.contains("0000.png: has another size than the display, 200x150"),
+        "{message}"
+    );
+    let message = stderr_text(&photograph(&picture, "fast"));
+    assert!(message.contains("a fraction of them"), "{message}");
+}
+
+/// Without a page and a camera, `shoot` says what it needs.
+#[test]
+fn wrong_options_of_a_session_are_named_with_their_remedy() {
+    let session = Session::new();
+    let sequence = session.text("sequence");
+    for (options, part) in [
+        (&["--camera", "nikon"][..], "neither a preset"),
+        (
+            &["--camera", "a {file} {exposrue}"],
+            "{exposrue} is not known",
+        ),
+        (
+            &["--camera", "sh {file} {exposure}"],
+            "list the camera's in --exposures",
+        ),
+        (
+            &["--camera", "sh {file}", "--exposures", "1/60"],
+            "needs a --camera with {exposure}",
+        ),
+        (
+            &["--camera", "sh {file}", "--extension", "jpg"],
+            "--extension jpg: is of no photograph that can be read",
+        ),
+        (&["--camera", "watch:/no/such/folder"], "is no folder"),
+    ] {
+        let output = run(&[&["shoot", &sequence, "--port", "0"], options].concat());
+        let message = stderr_text(&output);
+        assert!(!output.status.success());
+        assert!(message.contains(part), "no {part}: {message}");
+    }
+    fs::remove_file(session.path("sequence/display/0003-ramp-032.png")).unwrap();
+    let output = run(&["shoot", &sequence, "--camera", "sh {file}", "--port", "0"]);
+    let message = stderr_text(&output);
+    assert!(
+        message.contains("0003-ramp-032.png: is missing"),
+        "{message}"
+    );
 }

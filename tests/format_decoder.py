@@ -228,6 +228,7 @@ def read_metadata(data):  # appendix C
     counts = {"patterns": is_integer, "photographs": is_integer}
     types["capture"] = lambda value: is_object(value, counts)
     types["shots_used"] = lambda value: type(value) is list and all(map(is_integer, value))
+    types["origin"] = lambda value: True
     try:
         decoder = json.JSONDecoder(
             object_pairs_hook=Fields, parse_int=parse_int, parse_constant=refuse_constant

@@ -40,6 +40,18 @@ fn simulate(capture: &Path, scene: &str, size: &[&str]) {
     assert!(output.status.success(), "{}", stderr_text(&output));
 }
 
+/// The scans of a file: everything after its index, whose metadata say what a recovery estimated from the rows that it had in
+/// memory.
+fn scans(file: &Path) -> Vec<u8> {
+    let inspected = json(
+        &command(&["inspect", text(file), "--json"])
+            .output()
+            .unwrap(),
+    );
+    let index = inspected["index_bytes"].as_u64().unwrap() as usize;
+    fs::read(file).unwrap().split_off(index)
+}
+
 #[test]
 fn with_little_memory_photographs_are_read_in_strips_with_the_same_result() {
     let folder = TempDir::new().unwrap();
@@ -96,7 +108,7 @@ fn with_little_memory_photographs_are_read_in_strips_with_the_same_result() {
         [whole, strips]
     };
     // NNLS chooses one weight of the common mode, the same from both samples, so the files are equal.
-    let [whole, strips] = whole_and_strips("nnls").map(|file| fs::read(file).unwrap());
+    let [whole, strips] = whole_and_strips("nnls").map(|file| scans(&file));
     assert!(whole == strips);
     // The learned prior depends on the sample, but its accuracy does not.
     let [whole, strips] = whole_and_strips("learned").map(|file| {
@@ -107,6 +119,63 @@ fn with_little_memory_photographs_are_read_in_strips_with_the_same_result() {
     assert!((whole - strips).abs() < 0.1, "{whole} dB, {strips} dB");
     let impossible = recover("learned", "lots").1;
     assert_eq!(impossible.status.code(), Some(2));
+}
+
+/// Saturation that is not declared, and a tone curve that is trusted, are found in a sample of the rows and hold for all strips.
+#[test]
+fn what_photographs_say_of_their_codes_holds_in_strips() {
+    let folder = TempDir::new().unwrap();
+    let [clean, faulty] = ["clean", "faulty"].map(|name| folder.path().join(name));
+    let size = [
+        "--camera",
+        "64x256",
+        "--light",
+        "32x128",
+        "--patterns",
+        "40",
+    ];
+    simulate(&clean, "stained-glass", &size);
+    let faults = ["--fault", "clip=0.4", "--fault", "compression=1.5"];
+    let photograph = ["photograph", text(&clean), "-o", text(&faulty)];
+    let output = command(&[&photograph[..], &faults].concat())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", stderr_text(&output));
+    let recover = |name: &str, memory: &str| {
+        let file = folder.path().join(name);
+        let args = [
+            "recover",
+            text(&faulty),
+            "-o",
+            text(&file),
+            "--method",
+            "nnls",
+        ];
+        let settings = ["--window", "5", "--trust", "estimated", "--quality", "40"];
+        let more = ["--memory", memory, "--json"];
+        let output = command(&[&args[..], &settings, &more].concat())
+            .output()
+            .unwrap();
+        (file, output)
+    };
+    let refused = stderr_text(&recover("none.ltm", "1M").1);
+    let least = refused.trim().rsplit(' ').next().unwrap();
+    let [whole, strips] = [("whole.ltm", "2G"), ("strips.ltm", least)].map(|(name, memory)| {
+        let (file, output) = recover(name, memory);
+        let report = json(&output);
+        let fields = report["estimated_fields"].as_array().unwrap();
+        let names = fields.iter().map(|field| field["field"].as_str().unwrap());
+        let names: Vec<&str> = names.collect();
+        assert!(names.contains(&"camera.saturation"), "{names:?}");
+        assert!(
+            report["saturated_samples"].as_u64().unwrap() > 100,
+            "{report}"
+        );
+        assert_eq!(report["strips"] == 1, name == "whole.ltm", "{report}");
+        (scans(&file), report["estimated_fields"].clone())
+    });
+    assert_eq!(whole.1, strips.1);
+    assert!(whole.0 == strips.0);
 }
 
 /// The capture that every [`Interruptible`] has a copy of.
@@ -306,6 +375,8 @@ fn a_killed_recovery_resumes_and_mismatches_are_named() {
         &["--window was 5, and is 9 now", "delete it"],
     );
     refuses(&["--patterns", "9"], &["--patterns was", "is 9 now"]);
+    let trusting = "--trust was declared, and is estimated now";
+    refuses(&["--trust", "estimated"], &[trusting]);
     let photo = recovery.capture.join("photos/0003.png");
     let sound = fs::read(&photo).unwrap();
     image::ImageBuffer::<image::Rgb<u16>, _>::new(128, 64)

@@ -7,14 +7,19 @@
 use std::ops::RangeInclusive;
 
 use super::sequence::{PatternSequence, PictureRole};
-use crate::simulate::GrayCodePattern;
+use crate::simulate::{GrayCodePattern, MONITOR_GAMMA};
 
 /// Largest brightness of the dark photograph, relative to the flood's. Room light must be less.
 const MAX_DARK: f64 = 0.25;
 /// Largest deviation of a reference, and of the sum of a Gray code pair, from the flood.
 const MAX_DEVIATION: f64 = 0.2;
-/// Steps of the ramp may be darker than the one before by this much, relative to the flood.
-const RAMP_TOLERANCE: f64 = 0.02;
+/// Displays emit between these powers of the code, as a share of the largest, give or take the tolerance.
+const RAMP_EXPONENTS: [f64; 2] = [3.5, 0.9];
+const RAMP_TOLERANCE: f64 = 0.05;
+/// Least rise from one step of the ramp to the next, relative to that of a display with an exponent of 2.2, and how much less
+/// noise and room light may make it, relative to the flood.
+const MIN_RAMP_RISE: f64 = 0.25;
+const RISE_TOLERANCE: f64 = 0.005;
 
 /// Brightness of all photographs, in the order in which they were taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +46,17 @@ impl SequenceBrightness {
     /// lengths.
     pub fn faults(&self, sequence: &PatternSequence) -> Vec<(usize, PairingFault)> {
         let photos: Vec<Option<usize>> = (0..sequence.pictures.len()).map(Some).collect();
+        self.faults_of(sequence, &photos)
+    }
+
+    /// Likewise, in the middle of a session: `is_taken` says which pictures have a photograph.
+    pub fn faults_so_far(
+        &self,
+        sequence: &PatternSequence,
+        is_taken: impl Fn(usize) -> bool,
+    ) -> Vec<(usize, PairingFault)> {
+        let photos = (0..sequence.pictures.len()).map(|i| is_taken(i).then_some(i));
+        let photos: Vec<Option<usize>> = photos.collect();
         self.faults_of(sequence, &photos)
     }
 
@@ -99,7 +115,7 @@ impl SequenceBrightness {
         if let Some(dark) = dark.filter(|_| black > MAX_DARK * (white + black)) {
             faults.push((dark, PairingFault::NotDark));
         }
-        let mut last_step = 0.0;
+        let mut last = (0.0, 0.0);
         for (i, photo) in photos.iter().enumerate() {
             let Some(photo) = *photo else {
                 continue;
@@ -108,12 +124,18 @@ impl SequenceBrightness {
                 PictureRole::Reference if (relative(photo) - 1.0).abs() > MAX_DEVIATION => {
                     faults.push((photo, PairingFault::NotLit(relative(photo))));
                 }
-                PictureRole::Ramp { .. } => {
-                    let step = relative(photo);
-                    if step < last_step - RAMP_TOLERANCE || step > 1.0 + RAMP_TOLERANCE {
+                PictureRole::Ramp { code } => {
+                    let (code, step) = (f64::from(*code) / 255.0, relative(photo));
+                    let [low, high] = RAMP_EXPONENTS.map(|exponent| code.powf(exponent));
+                    let is_plausible =
+                        (low - RAMP_TOLERANCE..=high + RAMP_TOLERANCE).contains(&step);
+                    let (last_code, last_step): (f64, f64) = last;
+                    let expected = code.powf(MONITOR_GAMMA) - last_code.powf(MONITOR_GAMMA);
+                    let rise = MIN_RAMP_RISE * expected - RISE_TOLERANCE;
+                    if !is_plausible || step - last_step < rise {
                         faults.push((photo, PairingFault::NotRising));
                     }
-                    last_step = step;
+                    last = (code, step);
                 }
                 PictureRole::GrayCode(pattern) if pattern.inverted => {
                     let plain = GrayCodePattern {
@@ -196,6 +218,15 @@ mod tests {
         brightness.thumbnails.swap(12, 14);
         brightness.thumbnails.swap(4, 6);
         assert_eq!(brightness.faults(&sequence)[0].1, PairingFault::NotRising);
+        brightness.thumbnails.swap(4, 6);
+        // A display that is one picture late, in the middle of the ramp and at its beginning.
+        for late in [2, 5, 9] {
+            let own = brightness.thumbnails[late].clone();
+            brightness.thumbnails[late] = brightness.thumbnails[late - 1].clone();
+            let faults = brightness.faults(&sequence);
+            assert_eq!(faults[0], (late, PairingFault::NotRising));
+            brightness.thumbnails[late] = own;
+        }
     }
 
     #[test]

@@ -66,10 +66,11 @@ struct CalibrationReport {
     affine_residual: Option<Distances>,
 }
 
+/// Distances in light elements.
 #[derive(Serialize)]
-struct Distances {
-    median: f64,
-    percentile_95: f64,
+pub struct Distances {
+    pub median: f64,
+    pub percentile_95: f64,
 }
 
 impl From<ResidualSummary> for Distances {

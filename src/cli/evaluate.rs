@@ -2,7 +2,7 @@
 //! against photographs that the recovery did not use.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Result, ensure};
@@ -17,7 +17,7 @@ use crate::capture::{CaptureFolder, GroundTruth, PhotographRowReader};
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light};
 use crate::study::{CaptureTruth, psnr};
-use crate::transport::{CHANNELS, Decibels, SnrAccumulator, transport_error};
+use crate::transport::{CHANNELS, Decibels, Geometry, SnrAccumulator, transport_error};
 
 /// Compare a file with the known transport, the relit pictures and the unused photographs of a capture
 #[derive(Debug, Args)]
@@ -89,18 +89,7 @@ pub fn evaluate(args: &EvaluateArgs) -> Result<EvaluateReport> {
     let file = read_ltm(&args.file, args.first)?;
     let header = &file.index.header;
     let folder = CaptureFolder::open(&args.capture)?;
-    let (geometry, manifest) = (&header.geometry, folder.manifest());
-    for (name, found, expected) in [
-        ("camera", geometry.camera, manifest.camera.extent()),
-        ("light", geometry.light, manifest.light.extent()),
-    ] {
-        ensure!(
-            found == expected,
-            "{} has {name} {found}, but {} has {expected}: it was not recovered from this capture",
-            args.file.display(),
-            args.capture.display(),
-        );
-    }
+    ensure_same_geometry(&header.geometry, &args.file, &folder)?;
     let mut report = EvaluateReport {
         file_bytes: header.file_bytes,
         read_bytes: file.progress.bytes,
@@ -115,6 +104,27 @@ pub fn evaluate(args: &EvaluateArgs) -> Result<EvaluateReport> {
     let used = file.index.metadata.read()?.shots_used;
     report.compare_with_photographs(&mut relighter, &folder, &used)?;
     Ok(report)
+}
+
+/// Refuses a file at `path` whose camera or light plane is not that of the capture.
+pub fn ensure_same_geometry(
+    geometry: &Geometry,
+    path: &Path,
+    folder: &CaptureFolder,
+) -> Result<()> {
+    let manifest = folder.manifest();
+    for (name, found, expected) in [
+        ("camera", geometry.camera, manifest.camera.extent()),
+        ("light", geometry.light, manifest.light.extent()),
+    ] {
+        ensure!(
+            found == expected,
+            "{} has {name} {found}, but {} has {expected}: it was not recovered from this capture",
+            path.display(),
+            folder.root().display(),
+        );
+    }
+    Ok(())
 }
 
 impl EvaluateReport {
@@ -225,7 +235,7 @@ impl EvaluateReport {
 
 /// Sums over samples.
 #[derive(Default)]
-struct SampleMoments {
+pub struct SampleMoments {
     count: f64,
     predicted: f64,
     measured: f64,
@@ -235,7 +245,7 @@ struct SampleMoments {
 }
 
 impl SampleMoments {
-    fn add(&mut self, predicted: f64, measured: f64) {
+    pub fn add(&mut self, predicted: f64, measured: f64) {
         self.count += 1.0;
         self.predicted += predicted;
         self.measured += measured;
@@ -245,7 +255,7 @@ impl SampleMoments {
     }
 
     /// Gain and offset of the line from predicted to measured samples, by least squares.
-    fn fit_line(&self) -> (f64, f64) {
+    pub fn fit_line(&self) -> (f64, f64) {
         let covariance = self.product - self.predicted * self.measured / self.count;
         let gain = covariance / (self.predicted_energy - self.predicted.powi(2) / self.count);
         match gain.is_finite() {
@@ -254,8 +264,17 @@ impl SampleMoments {
         }
     }
 
+    /// Correlation of predicted and measured samples; `None` if either is constant.
+    pub fn correlation(&self) -> Option<f64> {
+        let covariance = self.product - self.predicted * self.measured / self.count;
+        let variances = (self.predicted_energy - self.predicted.powi(2) / self.count)
+            * (self.measured_energy - self.measured.powi(2) / self.count);
+        let correlation = covariance / variances.sqrt();
+        correlation.is_finite().then_some(correlation)
+    }
+
     /// Error of a line from predicted to measured samples.
-    fn error_of_line(&self, gain: f64, offset: f64) -> SnrAccumulator {
+    pub fn error_of_line(&self, gain: f64, offset: f64) -> SnrAccumulator {
         let line = gain * gain * self.predicted_energy
             + 2.0 * gain * offset * self.predicted
             + offset * offset * self.count;

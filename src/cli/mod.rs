@@ -9,6 +9,8 @@ mod calibrate;
 mod capture_writer;
 mod check;
 mod evaluate;
+mod field_suggestion;
+mod file_hash;
 mod finding;
 mod import;
 mod inspect;
@@ -20,9 +22,11 @@ mod patterns;
 mod photograph;
 mod process_resources;
 mod progress;
+mod quality_report;
 mod recover;
 mod relight;
 mod report;
+mod shoot;
 mod simulate;
 mod study;
 mod study_faults;
@@ -44,6 +48,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Patterns(patterns::PatternsArgs),
+    Shoot(shoot::ShootArgs),
     Assemble(assemble::AssembleArgs),
     Import(import::ImportArgs),
     Calibrate(calibrate::CalibrateArgs),
@@ -52,6 +57,7 @@ enum Command {
     Check(check::CheckArgs),
     Recover(recover::RecoverArgs),
     Evaluate(evaluate::EvaluateArgs),
+    Report(quality_report::ReportArgs),
     Relight(relight::RelightArgs),
     Inspect(inspect::InspectArgs),
     Verify(verify::VerifyArgs),
@@ -71,6 +77,7 @@ const DATA_ERROR_STATUS: u8 = 65;
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Patterns(args) => patterns::run(&args),
+        Command::Shoot(args) => shoot::run(&args),
         Command::Assemble(args) => assemble::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
@@ -79,6 +86,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Report(args) => quality_report::run(&args),
         Command::Relight(args) => relight::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Verify(args) => verify::run(&args),

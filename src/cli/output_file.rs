@@ -47,6 +47,20 @@ pub const PNG: FileSignature = FileSignature {
     extension: Some("png"),
     signature: &[(0, b"\x89PNG"), (24, &[8, 2])],
 };
+/// A photograph: a 16-bit RGB PNG.
+pub const PHOTOGRAPH: FileSignature = FileSignature {
+    name: "a photograph",
+    extension: Some("png"),
+    signature: &[(0, b"\x89PNG"), (24, &[16, 2])],
+};
+/// The first bytes of every report.
+pub const REPORT_START: &str = "<!doctype html><!--ltm-->";
+/// A report as a page.
+pub const HTML: FileSignature = FileSignature {
+    name: "a report",
+    extension: Some("html"),
+    signature: &[(0, REPORT_START.as_bytes())],
+};
 
 impl FileSignature {
     /// Whether `path` is free, empty, or holds a file of this format as this program writes it.

@@ -86,7 +86,8 @@ pub fn run(args: &PatternsArgs) -> Result<()> {
         print_line(&line)?;
     }
     eprintln!(
-        "{0}: {1} pictures; open {0}/{PLAYER_NAME} in a browser and photograph each, then run `ltm-export assemble`",
+        "{0}: {1} pictures; `ltm-export shoot` photographs them; or open {0}/{PLAYER_NAME} in a browser, photograph each by \
+         hand, and run `ltm-export assemble`",
         args.output.display(),
         sequence.pictures.len()
     );
@@ -103,6 +104,11 @@ fn player(json: &str) -> String {
     PAGE.replace("/* player.css */", STYLES)
         .replace("/* player.js */", SCRIPT)
         .replace(">{}</script>", &format!(">{json}</script>"))
+}
+
+/// The same page under the control of the server that it comes from.
+pub fn served_player(json: &str) -> String {
+    player(json).replacen("<html ", "<html data-remote ", 1)
 }
 
 /// Writes the sequence, its pictures and the player into the folder `root`; `codes` are those of the light elements in each.

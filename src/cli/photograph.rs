@@ -4,13 +4,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use image::ExtendedColorType;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
 
 use super::assemble::read_sequence;
 use super::capture_writer::{MAX_ELECTRONS, write_png};
+use super::output_file::{OutputFile, PHOTOGRAPH};
+use super::shoot::Exposure;
 use super::{output_folder, progress};
-use crate::acquisition::{PictureRole, SEQUENCE_NAME};
+use crate::acquisition::{DisplayLayout, PatternSequence, PictureRole, SEQUENCE_NAME};
 use crate::capture::{
     CaptureFolder, GroundTruth, LinearPhoto, MANIFEST_NAME, Manifest, ManifestCamera, Pattern, Shot,
 };
@@ -18,6 +21,9 @@ use crate::simulate::{
     Camera, GrayCodePattern, PatternImage, RandomStreamId, SessionFault, emission,
 };
 use crate::transport::{CHANNELS, Extent};
+
+/// Exposure time in seconds with which a photograph has the measurements of the transport.
+const REFERENCE_EXPOSURE: f64 = 1.0 / 15.0;
 
 /// Photograph the known transport of a capture again, with faults of rigs
 #[derive(Debug, Args)]
@@ -32,6 +38,13 @@ pub struct PhotographArgs {
     /// patterns; the output is a folder of numbered photographs
     #[arg(long, value_name = "DIR")]
     sequence: Option<PathBuf>,
+    /// Photograph only this one: a file with the pixels of the display, for instance a screenshot. The output is a PNG. Stands in for a
+    /// camera: `ltm-export shoot --camera 'ltm-export photograph ... --picture {picture} -o {file} --seed {photograph}'`
+    #[arg(long, value_name = "FILE", requires = "sequence")]
+    picture: Option<PathBuf>,
+    /// Exposure time of that photograph in seconds, or a fraction of them
+    #[arg(long, value_name = "TIME", requires = "picture", default_value = "1/15", value_parser = Exposure::parse)]
+    exposure: Exposure,
     #[arg(long = "fault", value_name = "NAME[=SIZE]", help = fault_help())]
     faults: Vec<SessionFault>,
     /// Seed of noise and faults
@@ -53,7 +66,10 @@ fn fault_help() -> String {
 
 pub fn run(args: &PhotographArgs) -> Result<()> {
     if let Some(sequence) = &args.sequence {
-        return photograph_sequence(args, sequence);
+        return match &args.picture {
+            Some(picture) => photograph_picture(args, sequence, picture),
+            None => photograph_sequence(args, sequence),
+        };
     }
     let shots = write_capture(args)?;
     eprintln!(
@@ -73,41 +89,90 @@ pub fn write_capture(args: &PhotographArgs) -> Result<usize> {
     Ok(session.manifest.shots.len())
 }
 
-/// Writes a photograph of each picture of the sequence in `folder`.
-fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
-    let truth = known_transport(args, &CaptureFolder::open(&args.capture)?)?;
+/// The sequence in `folder`, whose light elements are those of the transport.
+fn sequence_of(
+    args: &PhotographArgs,
+    truth: &GroundTruth,
+    folder: &Path,
+) -> Result<PatternSequence> {
     let sequence = read_sequence(folder)?;
-    let layout = sequence.layout;
+    let light = sequence.layout.light;
     ensure!(
-        layout.light == truth.light_plane,
-        "{}: has {} light elements, but the transport of {} has {}",
+        light == truth.light_plane,
+        "{}: has {light} light elements, but the transport of {} has {}",
         folder.join(SEQUENCE_NAME).display(),
-        layout.light,
         args.capture.display(),
         truth.light_plane
     );
-    let emissions = sequence.pictures.par_iter().map(|picture| {
-        let path = folder.join(&picture.picture);
-        let read = || -> Result<Vec<f32>> {
-            let shown = image::open(&path)?.into_luma8();
-            ensure!(
-                shown.dimensions() == (layout.display.width, layout.display.height),
-                "has another size than the display, {}",
-                layout.display
-            );
-            let code = |(u, v)| {
-                shown
-                    .get_pixel(layout.centre(u, v)[0], layout.centre(u, v)[1])
-                    .0[0]
-            };
-            Ok(layout
-                .light
-                .cells()
-                .map(|cell| emission(code(cell)) as f32)
-                .collect())
+    Ok(sequence)
+}
+
+/// Emissions `[M]` of the light elements in a picture of the display.
+fn read_emissions(layout: &DisplayLayout, path: &Path) -> Result<Vec<f32>> {
+    let read = || -> Result<Vec<f32>> {
+        let shown = image::open(path)?.into_luma8();
+        ensure!(
+            shown.dimensions() == (layout.display.width, layout.display.height),
+            "has another size than the display, {}",
+            layout.display
+        );
+        let code = |(u, v)| {
+            let [x, y] = layout.centre(u, v);
+            shown.get_pixel(x, y).0[0]
         };
-        read().with_context(|| path.display().to_string())
-    });
+        let cells = layout.light.cells();
+        Ok(cells.map(|cell| emission(code(cell)) as f32).collect())
+    };
+    read().with_context(|| path.display().to_string())
+}
+
+/// Writes a photograph of the picture at `path`, of the sequence in `folder`.
+fn photograph_picture(args: &PhotographArgs, folder: &Path, path: &Path) -> Result<()> {
+    if let Some(fault) = args.faults.iter().find(|fault| fault.is_of_session()) {
+        bail!(
+            "--fault {fault} needs more photographs than one; photograph a sequence or a capture with it"
+        );
+    }
+    let output = OutputFile::create(&args.output, &PHOTOGRAPH)?;
+    let truth = known_transport(args, &CaptureFolder::open(&args.capture)?)?;
+    let sequence = sequence_of(args, &truth, folder)?;
+    let mut lights = [read_emissions(&sequence.layout, path)?];
+    let light = sequence.layout.light;
+    let mut random = RandomStreamId::Fault.start(args.seed);
+    for fault in &args.faults {
+        fault.change_emissions(light, &mut lights, &mut [], &mut random);
+    }
+    let channels: Vec<_> = (0..CHANNELS)
+        .map(|c| channel_pictures(&truth, c, &lights))
+        .collect();
+    let mut pictures = interleave(&channels);
+    for fault in &args.faults {
+        fault.change_pictures(truth.camera, &mut pictures, &mut random);
+    }
+    let picture = pictures.first_mut().context("no picture")?;
+    let gain = (args.exposure.seconds / REFERENCE_EXPOSURE) as f32;
+    picture
+        .as_flattened_mut()
+        .iter_mut()
+        .for_each(|y| *y *= gain);
+    let codes = expose(args, 0, picture);
+    let Extent { width, height } = truth.camera;
+    output.finish(|out| {
+        let bytes = bytemuck::cast_slice(&codes);
+        PngEncoder::new(out)
+            .write_image(bytes, width, height, ExtendedColorType::Rgb16)
+            .context("cannot be encoded")
+    })?;
+    Ok(())
+}
+
+/// Writes a photograph of each picture of the sequence in `folder`.
+fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
+    let truth = known_transport(args, &CaptureFolder::open(&args.capture)?)?;
+    let sequence = sequence_of(args, &truth, folder)?;
+    let layout = sequence.layout;
+    let pictures = sequence.pictures.par_iter();
+    let emissions = pictures.map(|picture| read_emissions(&layout, &folder.join(&picture.picture)));
     let emissions = emissions.collect::<Result<Vec<Vec<f32>>>>()?;
     let declared = |fault: &&SessionFault| fault.is_declared();
     if let Some(fault) = args.faults.iter().find(declared) {

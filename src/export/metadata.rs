@@ -58,5 +58,7 @@ pub fn metadata(provenance: &Provenance, method: Method) -> Metadata {
         method: method.name().to_owned(),
         units: UNITS.to_owned(),
         shots_used: provenance.shots.clone(),
+        #[cfg(not(target_arch = "wasm32"))]
+        origin: None,
     }
 }

@@ -40,6 +40,10 @@ pub struct Metadata {
     pub units: String,
     /// Indices of the capture's shots that the recovery used. The others can validate it.
     pub shots_used: Vec<usize>,
+    /// How and from what the file was made; pages neither write nor read it.
+    #[cfg(not(target_arch = "wasm32"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin: Option<serde_json::Value>,
 }
 
 /// How an object was captured.

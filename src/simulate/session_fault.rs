@@ -295,6 +295,15 @@ impl SessionFault {
         matches!(self.kind, Kind::Mirror | Kind::Gamma)
     }
 
+    /// Whether it is one of several photographs, or of what is declared of them.
+    pub fn is_of_session(self) -> bool {
+        let is_of_several = matches!(
+            self.kind,
+            Kind::Blend | Kind::Swap | Kind::Slip | Kind::Exposure
+        );
+        is_of_several || self.is_declared()
+    }
+
     /// Changes what is declared.
     pub fn change_manifest(self, manifest: &mut Manifest) {
         match self.kind {

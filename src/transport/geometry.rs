@@ -147,7 +147,7 @@ impl Window {
 }
 
 /// The camera pixels of a tile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TileRect {
     /// Column of the first pixel.
     pub x: u32,

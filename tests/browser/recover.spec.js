@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import { expect, note, test } from './fixtures.js';
 import { capturePicture, mountPhoto, waitForEvents, waitForLoad } from './page-helpers.js';
 import { FIXTURE, prepareRecovery, recoverFixture, zipFixture } from './recovery-page.js';
-import { glassBytes, nativePicture } from './test-photos.js';
+import { contentHash, glassBytes, nativePicture } from './test-photos.js';
 
 /** @typedef {import('@playwright/test').Page} Page */
 
@@ -59,9 +59,8 @@ test('a folder is recovered to the file that the command line writes, without lo
   const { file, reports, seconds, expectedSnr, heldOutSnr, warnings } = result;
   note(`${seconds.toFixed(2)} s, expected ${expectedSnr} dB, held out ${heldOutSnr} dB`);
 
-  await step('the bytes are the same', () => {
-    expect(file.length).toBe(glassBytes().length);
-    expect(file.equals(glassBytes())).toBe(true);
+  await step('the bytes are the same, but for the origin', () => {
+    expect(contentHash(file)).toBe(contentHash(glassBytes()));
   });
   await step(`no task is longer than ${LONG_TASK_MS} ms`, () => expect(longTasks).toEqual([]));
   await step('held-out photographs are predicted', () => {

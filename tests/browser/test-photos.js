@@ -138,6 +138,32 @@ function fileBytes(name) {
 
 /** The photograph that most tests show: 64 × 64 camera pixels, one tile. */
 export const glassBytes = () => fileBytes('glass.ltm');
+/**
+ * Hash of a file without the origin in its metadata, which the command line alone writes, and without the lengths and checksums
+ * that depend on it (docs/format.md, section 3.1).
+ *
+ * @param {Buffer} bytes
+ */
+export function contentHash(bytes) {
+  const header = Buffer.from(bytes.subarray(0, 144));
+  const metadataStart = 144 + header.readUInt32LE(104) + header.readUInt32LE(112);
+  const metadataEnd = metadataStart + header.readUInt32LE(120);
+  const metadata = JSON.parse(bytes.subarray(metadataStart, metadataEnd).toString());
+  delete metadata.origin;
+  for (const [start, end] of /** @type {const} */ ([
+    [88, 96],
+    [120, 128],
+    [140, 144],
+  ])) {
+    header.fill(0, start, end);
+  }
+  return createHash('sha256')
+    .update(header)
+    .update(bytes.subarray(144, metadataStart))
+    .update(JSON.stringify(metadata))
+    .update(bytes.subarray(metadataEnd))
+    .digest('hex');
+}
 /** The photograph that the gallery shows first. */
 export const demoBytes = () => fileBytes('stained-glass.ltm');
 

@@ -1,13 +1,22 @@
 /**
  * The pattern player: shows the pictures of a sequence one after the other, pixel by pixel, and nothing else.
  * `ltm-export patterns` writes it into the folder of a sequence, with the sequence in the page, so that it needs no server
- * and no network.
+ * and no network. `ltm-export shoot` serves it, says which picture comes next, and is told when the display shows it.
  */
 
 /** @typedef {{ layout: { display: { width: number, height: number } }, pictures: { picture: string, role: string }[] }} Sequence */
 
+/** @typedef {{ picture: number, photograph: number }} ShownPicture */
+/**
+ * @typedef {{ run: number, sequence: string, version: number, show: ShownPicture | null, message: string, histogram: number[][], question: string | null,
+ *   finished: boolean }} PageState
+ */
+
 const NEXT_KEYS = new Set([' ', 'ArrowRight', 'ArrowDown', 'PageDown', 'Enter']);
 const BACK_KEYS = new Set(['ArrowLeft', 'ArrowUp', 'PageUp', 'Backspace']);
+/** Time after which a server that does not answer is asked again, in milliseconds. */
+const RETRY_INTERVAL = 1000;
+const CHANNEL_COLOURS = ['#d33', '#2a2', '#36d'];
 
 /**
  * @template {HTMLElement} T
@@ -92,6 +101,10 @@ class Player {
   wakeLock;
   /** Pictures that the browser keeps. @type {HTMLImageElement[]} */
   preloaded = [];
+  /** Another one than the operator says which picture is next. */
+  isRemote = false;
+  /** Is told that the stage shows the picture at `position`, or nothing. @type {(isShown: boolean) => void} */
+  onShown = () => {};
 
   constructor() {
     this.position = Math.min(Math.max(Number.parseInt(readPosition() ?? '', 10) || 0, 0), last);
@@ -198,6 +211,7 @@ class Player {
     if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
     this.wakeLock?.release().catch(() => {});
     this.wakeLock = undefined;
+    if (stage) this.onShown(false);
   }
 
   /** @param {KeyboardEvent} event */
@@ -212,6 +226,7 @@ class Player {
 
   /** By hand. @param {number} step */
   move(step) {
+    if (this.isRemote) return;
     this.due = undefined;
     this.go(step);
   }
@@ -260,13 +275,16 @@ class Player {
       report(`${picture} cannot be read. Keep this page in the folder of its pictures.`);
       return;
     }
-    if (stage === this.stage && stage.wanted === url) this.schedule();
+    if (stage !== this.stage || stage.wanted !== url) return;
+    this.onShown(true);
+    this.schedule();
   }
 
   /** By time, pictures follow at multiples of the interval, however long they take to load: a camera keeps its own time. */
   schedule() {
     this.clearTimer();
-    if (!this.stage || element('pace', HTMLSelectElement).value !== 'time') return;
+    const isPaced = element('pace', HTMLSelectElement).value === 'time';
+    if (!this.stage || this.isRemote || !isPaced) return;
     const seconds = Math.max(element('interval', HTMLInputElement).valueAsNumber || 3, 0.2);
     const due = this.due ?? performance.now() + 1000 * seconds;
     this.due = due;
@@ -287,6 +305,103 @@ class Player {
     } catch {
       // Not in every browser, and not from files: the page asks to switch off the screen saver.
     }
+  }
+}
+
+/** The player under the control of `ltm-export shoot`, which serves the page and photographs what it shows. */
+class RemoteControl {
+  /** The picture that the server wants. @type {ShownPicture | undefined} */
+  wanted;
+  /** The server's run: another one counts anew. */
+  run = 0;
+  /** The server's sequence, once known, and whether its photographs are all taken. @type {string | undefined} */
+  sequence;
+  isFinished = false;
+  /** Tells this page from others of the same server. */
+  page = crypto.randomUUID();
+
+  /** @param {Player} player */
+  constructor(player) {
+    this.player = player;
+    player.isRemote = true;
+    player.onShown = (isShown) => this.confirm(isShown);
+    for (const part of document.querySelectorAll('.by-hand')) part.setAttribute('hidden', '');
+    element('session', HTMLElement).hidden = false;
+    element('again', HTMLElement).onclick = () => this.answer(true);
+    element('go-on', HTMLElement).onclick = () => this.answer(false);
+    addEventListener('pagehide', () => {
+      navigator.sendBeacon('shown', jsonBlob({ page: this.page, shown: null }));
+    });
+    this.follow();
+  }
+
+  /** Shows what the server wants, until the session ends. */
+  async follow() {
+    let version = 0;
+    for (;;) {
+      /** @type {PageState} */
+      let state;
+      try {
+        const response = await fetch(`state/${version}`);
+        if (!response.ok) throw new Error(response.statusText);
+        state = await response.json();
+      } catch {
+        if (!this.isFinished) {
+          tell('The program that photographs does not answer. Run it again: the session goes on.');
+        }
+        await new Promise((resolve) => setTimeout(resolve, RETRY_INTERVAL));
+        version = 0;
+        continue;
+      }
+      version = state.version;
+      this.sequence ??= state.sequence;
+      // The pictures in this page are of another session.
+      if (state.sequence !== this.sequence) location.reload();
+      this.isFinished = state.finished;
+      this.update(state);
+    }
+  }
+
+  /** @param {PageState} state */
+  update({ run, show, message, histogram, question, finished }) {
+    if (run !== this.run) this.wanted = undefined;
+    this.run = run;
+    tell(message);
+    drawHistogram(histogram);
+    const asked = element('question', HTMLElement);
+    asked.hidden = question === null;
+    const text = asked.querySelector('span');
+    if (text) text.textContent = question;
+    if (finished) {
+      this.player.closeStage();
+      report('');
+      return;
+    }
+    const isNew = show?.photograph !== this.wanted?.photograph;
+    if (!show || !isNew) return;
+    this.wanted = show;
+    this.player.position = show.picture;
+    this.player.update();
+  }
+
+  /** Tells the server what the display shows, once it does. @param {boolean} isShown */
+  async confirm(isShown) {
+    const { player, wanted } = this;
+    const { stage } = player;
+    if (isShown && stage) {
+      // The picture is decoded; two frames later it is on the screen.
+      for (let frame = 0; frame < 2; frame += 1) {
+        await new Promise((resolve) => stage.view.requestAnimationFrame(resolve));
+      }
+      if (player.stage !== stage || wanted !== this.wanted) return;
+    }
+    await post('shown', { page: this.page, shown: isShown && wanted ? wanted : null });
+  }
+
+  /** @param {boolean} again */
+  async answer(again) {
+    element('question', HTMLElement).hidden = true;
+    await post('answer', { again });
   }
 }
 
@@ -350,4 +465,41 @@ async function otherScreen() {
   }
 }
 
-new Player();
+/** @param {unknown} value */
+function jsonBlob(value) {
+  return new Blob([JSON.stringify(value)], { type: 'application/json' });
+}
+
+/** @param {string} path @param {unknown} value */
+async function post(path, value) {
+  try {
+    await fetch(path, { method: 'POST', body: jsonBlob(value) });
+  } catch {
+    // The server is gone, which the page says already.
+  }
+}
+
+/** @param {string} text */
+function tell(text) {
+  const message = element('message', HTMLElement);
+  if (message.textContent !== text) message.textContent = text;
+}
+
+/** One line for each channel, on a logarithmic scale. @param {number[][]} channels */
+function drawHistogram(channels) {
+  const most = Math.max(...channels.flat(), 1);
+  const lines = channels.map((bins, c) => {
+    const points = bins.map((count, i) => {
+      const height = (32 * Math.log1p(count)) / Math.log1p(most);
+      return `${((i + 0.5) * 64) / bins.length},${32 - height}`;
+    });
+    const line = document.createElementNS('http://www.w3.org/2000/svg', 'polyline');
+    line.setAttribute('points', points.join(' '));
+    line.setAttribute('stroke', CHANNEL_COLOURS[c] ?? '#888');
+    return line;
+  });
+  document.getElementById('histogram')?.replaceChildren(...lines);
+}
+
+const player = new Player();
+if ('remote' in document.documentElement.dataset) new RemoteControl(player);

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
+
 use super::photograph_file::DevelopedPhotograph;
 
 /// Share of the samples of a photograph that may be too far below black for a code.
@@ -10,7 +12,7 @@ const MAX_CLIPPED: f64 = 0.001;
 const MAX_SATURATED: f64 = 0.001;
 
 /// What a photograph says of the levels.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct PhotographLevels {
     /// Share of the samples that are saturated.
     pub saturated_share: f64,

@@ -6,6 +6,7 @@ use std::io::BufReader;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
+use serde::{Deserialize, Serialize};
 
 use super::photograph_list::{is_picture, is_raw};
 use crate::capture::{CameraResponse, ManifestCamera};
@@ -29,7 +30,7 @@ const MIN_PILE_SHARE: f64 = 0.5;
 const RAW_WHITE: f64 = 65_000.0;
 
 /// The samples of a photograph's file. Photographs of one capture have the same.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SampleKind {
     /// Integers of 8 bits.
     EightBit,
@@ -64,7 +65,7 @@ impl fmt::Display for SampleKind {
 }
 
 /// How photographs become linear.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DevelopSettings {
     /// Tone curve; `None` if it is not declared.
     pub response: Option<CameraResponse>,
@@ -270,6 +271,14 @@ fn kept_part(picture: Extent, settings: &DevelopSettings) -> Result<TileRect> {
     Ok(rect)
 }
 
+/// The part of a thumbnail that pixel (x, y) of a photograph belongs to.
+pub fn thumbnail_part(photograph: Extent, x: u32, y: u32) -> usize {
+    let parts = |side: u32| THUMBNAIL_SIDE.min(side as usize);
+    let place = |at: u32, side: u32| at as usize * parts(side) / side as usize;
+    let Extent { width, height } = photograph;
+    place(y, height) * parts(width) + place(x, width)
+}
+
 /// The largest sample of a channel, and how many samples are equal to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct LargestSample {
@@ -338,7 +347,8 @@ impl Development {
         let bin = self.bin;
         let extent = Extent::new(picture.width / bin, picture.height / bin);
         let mut codes = Vec::with_capacity(extent.area());
-        let mut sums = vec![[0.0; 2]; THUMBNAIL_SIDE * THUMBNAIL_SIDE];
+        let mut sums =
+            vec![[0.0; 2]; thumbnail_part(extent, extent.width - 1, extent.height - 1) + 1];
         let (mut saturated, mut clipped) = (0, 0);
         let mut largest = [LargestSample::default(); CHANNELS];
         for (x, y) in extent.cells() {
@@ -357,8 +367,7 @@ impl Development {
                     total[c] += self.response.linearise(share);
                 }
             }
-            let place = |at: u32, side: u32| at as usize * THUMBNAIL_SIDE / side as usize;
-            let part = place(y, extent.height) * THUMBNAIL_SIDE + place(x, extent.width);
+            let part = thumbnail_part(extent, x, y);
             codes.push(std::array::from_fn(|c| {
                 let measurement = total[c] / f64::from(bin * bin);
                 sums[part][0] += measurement;
@@ -372,10 +381,9 @@ impl Development {
                 code as u16
             }));
         }
-        let parts = sums.iter().filter(|[_, count]| *count > 0.0);
         Ok(AveragedPhotograph {
             extent,
-            thumbnail: parts.map(|[sum, count]| sum / count).collect(),
+            thumbnail: sums.iter().map(|[sum, count]| sum / count).collect(),
             codes,
             saturated,
             clipped,

@@ -37,6 +37,11 @@ pub fn is_raw(path: &Path) -> bool {
     has_extension(path, &RAW_EXTENSIONS)
 }
 
+/// Whether a file is a photograph that can be read, by its name.
+pub fn is_photograph(path: &Path) -> bool {
+    is_picture(path) || is_raw(path)
+}
+
 /// Hidden files are others: macOS keeps notes in `._IMG_1.tif`.
 fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     let is_hidden = |name: &OsStr| name.to_string_lossy().starts_with('.');
@@ -53,7 +58,7 @@ fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(path)? {
         let file = entry?.path();
-        if (is_picture(&file) || is_raw(&file)) && file.is_file() {
+        if is_photograph(&file) && file.is_file() {
             files.push(file);
         }
     }

@@ -11,7 +11,7 @@ mod photograph_findings;
 mod report;
 mod scanned_capture;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Error, Result};
@@ -21,7 +21,8 @@ use rayon::prelude::*;
 use self::examination::Examination;
 use self::file_findings::FileFault;
 use self::photograph_findings::Brightness;
-use self::report::{CheckReport, ShotReport};
+pub use self::report::CheckReport;
+use self::report::ShotReport;
 use self::scanned_capture::ScannedCapture;
 use super::advice::error_with_remedy;
 use super::finding::Finding;
@@ -33,6 +34,7 @@ use crate::calibrate::GrayCodeQuality;
 use crate::capture::{CaptureErrorKind, CaptureFolder, PhotographRole};
 use crate::job_executor::Cancelled;
 use crate::recover::{MIN_PATTERNS, RecoverError};
+use crate::transport::Window;
 
 /// Check a capture folder before it is recovered: all that is wrong with it, each with its remedy
 #[derive(Debug, Args)]
@@ -69,6 +71,24 @@ pub fn run(args: &CheckArgs) -> Result<()> {
         true => Ok(()),
         false => Err(NotReadyError.into()),
     }
+}
+
+/// Checks the capture at `capture`, as for a recovery in `window`.
+///
+/// # Errors
+/// If it is no capture folder, or the command is interrupted.
+pub fn check_capture(
+    capture: &Path,
+    window: Window,
+    cores: &InterruptibleCores,
+) -> Result<CheckReport> {
+    let args = CheckArgs {
+        capture: capture.to_owned(),
+        window: Some(window),
+        strict: false,
+        json: false,
+    };
+    check(&args, cores)
 }
 
 fn check(args: &CheckArgs, cores: &InterruptibleCores) -> Result<CheckReport> {

@@ -136,7 +136,11 @@ impl CheckReport {
     fn verdict(&self) -> String {
         let [errors, warnings] = [(self.errors, "error"), (self.warnings, "warning")].map(plural);
         if self.errors > 0 {
-            return format!("{errors}, {warnings}: correct the errors before you recover");
+            let advice = match self.examined {
+                Some(_) => "",
+                None => "; then check again, as photographs were not compared with one another",
+            };
+            return format!("{errors}, {warnings}: correct the errors before you recover{advice}");
         }
         if !self.ready {
             return format!("{errors}, {warnings}: not ready, as --strict allows no warning");

@@ -13,6 +13,7 @@ use super::capture_sample::{CaptureSample, SampleSource};
 use super::checkpoint::{Checkpoint, compress_tile, lock};
 use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
 use super::messages;
+use super::origin::{FileOrigin, OriginInput};
 use super::preparation::{CapturePreparation, PreparationSettings, PreparedCapture};
 use super::report::{RecoverReport, photograph_reports};
 use crate::capture::{CaptureFolder, DefectivePixels};
@@ -89,12 +90,24 @@ impl RecoverJob<'_> {
         let CaptureSample { folder, shots, .. } = &sample;
         let (folder, shots) = (folder.clone(), shots.clone());
         let noise = sample.measurements.noise;
+        // Before the long work, so that a file that cannot be read fails early.
+        let origin = FileOrigin::new(
+            &OriginInput {
+                folder: self.folder,
+                shots: self.shots,
+                window: window.side(),
+                noise,
+                expected_snr_db: prepared.expected_snr(),
+            },
+            self.source.cores,
+        )?;
         let (overexposed, defects) = self.recover_tiles(sample, recovery, checkpoint)?;
         findings.add(messages::defective_pixels(defects));
         findings.add(messages::overexposure(overexposed));
         findings.check(self.args.strict)?;
         let provenance = Provenance::new(folder.manifest(), self.shots);
-        let metadata = export::metadata(&provenance, method);
+        let mut metadata = export::metadata(&provenance, method);
+        metadata.origin = Some(serde_json::to_value(origin)?);
         let patterns = metadata.capture.patterns;
         let encode = || self.encode(recovery, checkpoint, metadata);
         let file = thread_pool(encoders)?.install(encode)?;

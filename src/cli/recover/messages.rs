@@ -5,6 +5,7 @@ use std::ops::Range;
 use anyhow::{Error, anyhow};
 
 use crate::capture::{CaptureFolder, DefectivePixels, Measurements};
+use crate::cli::field_suggestion::similar_fields;
 use crate::cli::finding::Finding;
 use crate::cli::measurement_reader::ReadSample;
 use crate::cli::value_parsers::ByteCount;
@@ -63,12 +64,19 @@ pub fn too_little_memory(TooLittleMemory { limit, min }: TooLittleMemory) -> Err
 
 /// Warns of fields of the manifest that are unknown.
 pub fn unknown_fields(folder: &CaptureFolder) -> Option<Finding> {
-    let unknown = &folder.manifest().unknown;
+    // What the laboratory notes for itself.
+    let is_note = |path: &&String| *path == "notes" || path.starts_with("notes.");
+    let unknown = folder.manifest().unknown.iter();
+    let unknown: Vec<&String> = unknown.filter(|path| !is_note(path)).collect();
+    let named = |path: &String| match &similar_fields(path)[..] {
+        [] => path.clone(),
+        similar => format!("{path} (is it \"{}\"?)", similar.join("\" or \"")),
+    };
     let message = || {
         format!(
             "{}: unknown fields are ignored: {}. Correct or remove them",
             folder.manifest_path().display(),
-            join_first(unknown.iter().cloned())
+            join_first(unknown.iter().map(|path| named(path)))
         )
     };
     (!unknown.is_empty()).then(|| Finding::warning("unknown-fields", message()))

@@ -10,6 +10,7 @@ mod checkpoint_key;
 pub(super) mod findings;
 mod job;
 pub(super) mod messages;
+pub(super) mod origin;
 pub(super) mod preparation;
 pub(super) mod report;
 
