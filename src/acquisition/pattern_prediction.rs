@@ -126,7 +126,7 @@ impl PatternPrediction {
     pub fn judge(
         &self,
         measured: &[f64],
-        patterns: &[Vec<f32>],
+        patterns: &[impl AsRef<[f32]>],
         own: usize,
         before: Option<&[f32]>,
     ) -> ShownPattern {
@@ -138,7 +138,7 @@ impl PatternPrediction {
             let weighted = values.iter().zip(&weights);
             weighted.map(|(value, weight)| value * weight).sum()
         };
-        let unblurred = self.shares(&patterns[own], 0);
+        let unblurred = self.shares(patterns[own].as_ref(), 0);
         let brightness = sum(measured) / sum(&unblurred).max(f64::MIN_POSITIVE);
         let centred = |values: &[f64]| centred(values, &weights);
         let measured = centred(measured);
@@ -151,7 +151,8 @@ impl PatternPrediction {
             dot(&measured, other) / norm.max(f64::MIN_POSITIVE)
         };
         let predicted = |emissions: &[f32], radius: u32| centred(&self.shares(emissions, radius));
-        let candidates = BLUR_RADII.map(|radius| (radius, predicted(&patterns[own], radius)));
+        let candidates =
+            BLUR_RADII.map(|radius| (radius, predicted(patterns[own].as_ref(), radius)));
         let fits = candidates.into_iter().max_by(|a, b| {
             let [a, b] = [a, b].map(|(_, expected)| correlation(expected));
             a.total_cmp(&b)
@@ -159,7 +160,7 @@ impl PatternPrediction {
         let (radius, expected) = fits.unwrap_or_default();
         let own_correlation = correlation(&expected);
         let others = (0..patterns.len()).filter(|&i| i != own);
-        let others = others.map(|i| (i, correlation(&predicted(&patterns[i], radius))));
+        let others = others.map(|i| (i, correlation(&predicted(patterns[i].as_ref(), radius))));
         let best = others.max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((other, lead)) = best
             && lead > own_correlation + MIN_LEAD

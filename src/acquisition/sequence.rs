@@ -44,6 +44,20 @@ pub enum PictureRole {
     Reference,
 }
 
+impl PictureRole {
+    /// The codes of the light elements, `[M]`; `None` of a random pattern, which has a file.
+    pub fn codes(&self, light: Extent) -> Option<Vec<u8>> {
+        let uniform = |code: u8| vec![code; light.area()];
+        Some(match self {
+            Self::Dark => uniform(0),
+            Self::Flood | Self::Reference => uniform(u8::MAX),
+            Self::Ramp { code } => uniform(*code),
+            Self::GrayCode(pattern) => grey_codes(pattern.codes(light)),
+            Self::Pattern { .. } => return None,
+        })
+    }
+}
+
 /// A picture of the sequence.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SequencePicture {
@@ -134,33 +148,36 @@ impl PatternSequence {
             pictures: Vec::new(),
         };
         let mut drawn = Vec::new();
-        let mut show = |role: PictureRole, codes: Vec<u8>| {
+        let mut show = |role: PictureRole, codes: Option<Vec<u8>>| {
+            drawn.extend(codes.or_else(|| role.codes(light)));
             sequence.add(role);
-            drawn.push(codes);
         };
-        let uniform = |code: u8| vec![code; light.area()];
-        show(PictureRole::Dark, uniform(0));
-        show(PictureRole::Flood, uniform(u8::MAX));
+        show(PictureRole::Dark, None);
+        show(PictureRole::Flood, None);
         for code in RAMP_CODES {
-            show(PictureRole::Ramp { code }, uniform(code));
+            show(PictureRole::Ramp { code }, None);
         }
         for pattern in GrayCodePattern::all(light) {
-            show(
-                PictureRole::GrayCode(pattern),
-                grey_codes(pattern.codes(light)),
-            );
+            show(PictureRole::GrayCode(pattern), None);
         }
         for i in 0..settings.patterns {
             if i > 0 && i % REFERENCE_INTERVAL == 0 {
-                show(PictureRole::Reference, uniform(u8::MAX));
+                show(PictureRole::Reference, None);
             }
             let mut stream = RandomStreamId::Pattern(i).start(settings.seed);
             let pattern = format!("patterns/{i:04}.png");
             let codes = grey_codes(settings.ensemble.draw(light, &mut stream));
-            show(PictureRole::Pattern { pattern }, codes);
+            show(PictureRole::Pattern { pattern }, Some(codes));
         }
-        show(PictureRole::Reference, uniform(u8::MAX));
+        show(PictureRole::Reference, None);
         (sequence, drawn)
+    }
+
+    /// Index of the first picture with a role.
+    pub fn position(&self, role: &PictureRole) -> Option<usize> {
+        self.pictures
+            .iter()
+            .position(|picture| picture.role == *role)
     }
 
     fn add(&mut self, role: PictureRole) {

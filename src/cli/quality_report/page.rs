@@ -278,7 +278,6 @@ fn provenance(report: &QualityReport) -> String {
         ("Creator", "creator"),
         ("Rights", "rights"),
         ("Written by", "writer"),
-        ("Written", "written"),
         ("Method", "method"),
     ] {
         row(name, &text(field));

@@ -224,8 +224,6 @@ fn shoot(
     photographer: &mut Photographer,
     store: &mut SessionStore,
 ) -> Result<SessionSettings> {
-    let develop = photographer.settings.develop.clone();
-    let sequence_sha256 = store.sequence_sha256()?;
     let settings = match store.settings()? {
         Some(begun) => begun,
         None => {
@@ -234,8 +232,8 @@ fn shoot(
             let chosen = photographer.find_exposure(store, &exposures)?;
             let exposure = photographer.exposure.as_ref();
             let settings = SessionSettings {
-                develop: develop.clone(),
-                sequence_sha256: sequence_sha256.clone(),
+                develop: photographer.settings.develop.clone(),
+                sequence_sha256: store.sequence_sha256()?,
                 exposure: exposure.map(|exposure| exposure.name.clone()),
                 flood_brightness: chosen.flood_brightness,
                 is_saturation_accepted: chosen.is_saturation_accepted,

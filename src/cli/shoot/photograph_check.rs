@@ -9,7 +9,7 @@ use crate::acquisition::{
     PairingFault, PatternPrediction, PhotographStatistics, PictureRole, SequenceBrightness,
     ShownPattern, luminance, shift_between,
 };
-use crate::calibrate::{CalibrationError, LightPlaneAxis};
+use crate::calibrate::CalibrationError;
 use crate::cli::advice::error_with_remedy;
 use crate::cli::assemble::{
     DevelopedPhotograph, PhotographLevels, fault_text, fit_gray_code, thumbnail_part,
@@ -89,18 +89,9 @@ impl PhotographCheck {
         let sequence = &store.sequence;
         let light = sequence.layout.light;
         let emissions = sequence.pictures.iter().map(|picture| {
-            let codes = match &picture.role {
-                PictureRole::Dark => vec![0; light.area()],
-                PictureRole::Flood | PictureRole::Reference => vec![u8::MAX; light.area()],
-                PictureRole::Ramp { code } => vec![*code; light.area()],
-                PictureRole::GrayCode(bit) => {
-                    let lit = light.cells().map(|(u, v)| match bit.axis {
-                        LightPlaneAxis::X => bit.is_lit(u),
-                        LightPlaneAxis::Y => bit.is_lit(v),
-                    });
-                    lit.map(|lit| if lit { u8::MAX } else { 0 }).collect()
-                }
-                PictureRole::Pattern { pattern } => read_codes(&folder.join(pattern), light)?,
+            let codes = match (&picture.role, picture.role.codes(light)) {
+                (PictureRole::Pattern { pattern }, _) => read_codes(&folder.join(pattern), light)?,
+                (_, codes) => codes.unwrap_or_default(),
             };
             Ok(codes
                 .into_iter()
@@ -245,13 +236,7 @@ impl PhotographCheck {
         verdict: &mut Verdict,
     ) -> Result<()> {
         let sequence = &store.sequence;
-        let thumbnail = |role: PictureRole| {
-            let at = sequence
-                .pictures
-                .iter()
-                .position(|picture| picture.role == role)?;
-            Some(&store.records()[at].as_ref()?.thumbnail)
-        };
+        let thumbnail = |role| store.taken(&role).map(|(_, record)| &record.thumbnail);
         let (Some(dark), Some(flood)) =
             (thumbnail(PictureRole::Dark), thumbnail(PictureRole::Flood))
         else {
@@ -266,11 +251,8 @@ impl PhotographCheck {
             _ => 0.0,
         };
         let measured: Vec<f64> = shares.map(share).collect();
-        let patterns: Vec<Vec<f32>> = self
-            .patterns
-            .iter()
-            .map(|&pattern| self.emissions[pattern].clone())
-            .collect();
+        let patterns = self.patterns.iter().map(|&i| &self.emissions[i]);
+        let patterns: Vec<&Vec<f32>> = patterns.collect();
         let own = self.patterns.iter().position(|&pattern| pattern == i);
         let own = own.context("not a pattern")?;
         let before = i.checked_sub(1).map(|before| &self.emissions[before][..]);
@@ -305,15 +287,14 @@ fn described(store: &SessionStore, i: usize, fault: PairingFault) -> String {
 
 /// The picture whose inverse picture `i` is.
 fn plain_of(store: &SessionStore, i: usize) -> Option<usize> {
-    let pictures = &store.sequence.pictures;
-    let PictureRole::GrayCode(bit) = pictures[i].role else {
+    let PictureRole::GrayCode(bit) = store.sequence.pictures[i].role else {
         return None;
     };
     let plain = PictureRole::GrayCode(GrayCodePattern {
         inverted: false,
         ..bit
     });
-    pictures.iter().position(|picture| picture.role == plain)
+    store.sequence.position(&plain)
 }
 
 fn read_codes(path: &Path, light: Extent) -> Result<Vec<u8>> {
@@ -350,18 +331,12 @@ fn predict(store: &SessionStore) -> Result<PatternPrediction> {
         Err(error) => return Err(error),
     };
     let sequence = &store.sequence;
-    let of_role = |role| {
-        sequence
-            .pictures
-            .iter()
-            .position(|picture| picture.role == role)
-    };
-    let flood = of_role(PictureRole::Flood).context("the sequence has no flood")?;
-    let camera = store.records()[flood].as_ref();
-    let camera = camera.context("the flood is missing")?.camera.extent();
+    let taken = store.taken(&PictureRole::Flood);
+    let (flood, record) = taken.context("the flood photograph is missing")?;
+    let camera = record.camera.extent();
     let light = read_luminance(store, flood)?;
-    let stray = match of_role(PictureRole::Dark) {
-        Some(dark) if store.records()[dark].is_some() => read_luminance(store, dark)?,
+    let stray = match store.taken(&PictureRole::Dark) {
+        Some((dark, _)) => read_luminance(store, dark)?,
         _ => vec![0.0; light.len()],
     };
     let at = |x: u32, y: u32| {
@@ -392,15 +367,12 @@ fn check_inverse(
     photo: &DevelopedPhotograph,
     verdict: &mut Verdict,
 ) -> Result<()> {
-    let pictures = &store.sequence.pictures;
-    let taken = |role: PictureRole| {
-        let at = pictures.iter().position(|picture| picture.role == role)?;
-        store.records()[at].as_ref().map(|record| (at, record))
-    };
     let plain = plain_of(store, i).filter(|&plain| store.records()[plain].is_some());
-    let (Some(plain), Some((flood, _)), Some((_, dark))) =
-        (plain, taken(PictureRole::Flood), taken(PictureRole::Dark))
-    else {
+    let (Some(plain), Some((flood, _)), Some((_, dark))) = (
+        plain,
+        store.taken(&PictureRole::Flood),
+        store.taken(&PictureRole::Dark),
+    ) else {
         return Ok(());
     };
     let dark = dark.thumbnail.iter().sum::<f64>() / dark.thumbnail.len() as f64;
@@ -442,11 +414,7 @@ fn check_reference(
     photo: &DevelopedPhotograph,
     verdict: &mut Verdict,
 ) -> Result<()> {
-    let pictures = &store.sequence.pictures;
-    let flood = pictures
-        .iter()
-        .position(|picture| picture.role == PictureRole::Flood);
-    let Some((flood, record)) = flood.and_then(|i| Some((i, store.records()[i].as_ref()?))) else {
+    let Some((flood, record)) = store.taken(&PictureRole::Flood) else {
         return Ok(());
     };
     let sum = |thumbnail: &[f64]| thumbnail.iter().sum::<f64>();

@@ -251,12 +251,7 @@ impl Photographer<'_> {
         store: &SessionStore,
         exposures: &[Exposure],
     ) -> Result<ChosenExposure> {
-        let is_flood = |role: &PictureRole| *role == PictureRole::Flood;
-        let flood = store
-            .sequence
-            .pictures
-            .iter()
-            .position(|picture| is_flood(&picture.role));
+        let flood = store.sequence.position(&PictureRole::Flood);
         let flood = flood.context("the sequence has no flood")?;
         if exposures.is_empty() {
             return self.ask_for_exposure(store, flood);

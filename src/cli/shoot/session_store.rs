@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tempfile::TempDir;
 
-use crate::acquisition::{PatternSequence, SequenceBrightness};
+use crate::acquisition::{PatternSequence, PictureRole, SequenceBrightness};
 use crate::capture::{MANIFEST_NAME, ManifestCamera};
 use crate::cli::assemble::{
     DevelopSettings, DevelopedPhotograph, FOLDERS, PhotographLevels, SampleKind, Session,
@@ -158,6 +158,12 @@ impl SessionStore {
 
     pub fn records(&self) -> &[Option<PhotographRecord>] {
         &self.records
+    }
+
+    /// The first picture with a role, and its photograph, if there is one.
+    pub fn taken(&self, role: &PictureRole) -> Option<(usize, &PhotographRecord)> {
+        let i = self.sequence.position(role)?;
+        Some((i, self.records[i].as_ref()?))
     }
 
     /// Indices of pictures without a photograph.
