@@ -19,11 +19,11 @@ const MIN_CORRELATION: f64 = 0.3;
 const MIN_LEAD: f64 = 0.2;
 /// Share of the light of the picture before, above which a photograph is a blend.
 const MIN_BLEND: f64 = 0.1;
+/// Standard errors by which that share must be above zero.
+const MIN_SIGNIFICANCE: f64 = 4.0;
 /// Brightness, relative to the expected one, that is no change of the exposure: lamps drift, displays dim bright pictures, and
 /// objects scatter light out of the picture.
 const BRIGHTNESS: std::ops::RangeInclusive<f64> = 0.7..=1.4;
-/// Standard errors by which that share must be above zero.
-const MIN_SIGNIFICANCE: f64 = 4.0;
 
 /// Which light elements light which part of the picture.
 #[derive(Clone, Debug, PartialEq)]

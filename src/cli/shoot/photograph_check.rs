@@ -20,7 +20,7 @@ use crate::transport::{CHANNELS, Extent};
 
 /// Change of a reference photograph's brightness that is worth a remark.
 const MIN_DRIFT: f64 = 0.03;
-/// Shift of a reference photograph in pixels that is worth a remark; with more than the other, the session is lost.
+/// Shift of a reference photograph in pixels from which on it is remarked, and above which the photograph is taken again.
 const MIN_SHIFT: f64 = 0.3;
 const MAX_SHIFT: f64 = 2.0;
 /// Sharpness of a photograph, relative to those of other patterns, or of a reference to the flood, below which it is blurred.
