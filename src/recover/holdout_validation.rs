@@ -198,14 +198,20 @@ fn variances(
     let (mut signal, mut noise) = (0.0, 0.0);
     for pixel in rect.pixels() {
         for c in 0..CHANNELS {
-            let sample = |l: &usize| measurements.sample(*l, pixel, c);
-            let noise_variance = |l: &usize| measurements.variance(*l, c, sample(l));
-            if variance(split.held_out.iter().map(sample)).is_none() {
+            // The variance of samples, and the mean of their noise's.
+            let variances = |l: &[usize]| {
+                let y = measurements.samples(l, pixel, c);
+                let samples = l.iter().zip(&y);
+                let noise = samples.map(|(&l, &y)| measurements.variance(l, c, y));
+                (variance(y.iter().copied()), finite_mean(noise))
+            };
+            let ((Some(_), of_held_out), (total, of_all)) =
+                (variances(&split.held_out), variances(&split.all))
+            else {
                 continue;
-            }
-            let total = variance(split.all.iter().map(sample)).unwrap_or_default();
-            signal += total - finite_mean(split.all.iter().map(noise_variance));
-            noise += finite_mean(split.held_out.iter().map(noise_variance));
+            };
+            signal += total.unwrap_or_default() - of_all;
+            noise += of_held_out;
         }
     }
     (signal, noise)

@@ -74,8 +74,8 @@ impl PixelwiseRecovery {
         let mut error = SnrAccumulator::default();
         let elements: Vec<_> = self.geometry.elements_of_window(window.0).collect();
         let mut add = |_: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
-            for &l in &split.held_out {
-                let y = measurements.sample(l, samples.pixel, samples.channel);
+            let held_out = measurements.samples(&split.held_out, samples.pixel, samples.channel);
+            for (&l, y) in split.held_out.iter().zip(held_out) {
                 if y.is_finite() {
                     let plane = measurements.patterns[l].plane(samples.channel);
                     let terms = elements.iter().zip(x);
@@ -97,8 +97,8 @@ impl PixelwiseRecovery {
         let pairs_of_window = |i: usize| {
             let mut pairs = Vec::new();
             let mut add = |equations: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
-                let sample = |&l: &usize| measurements.sample(l, samples.pixel, samples.channel);
-                let count = all.iter().map(sample).filter(|y| y.is_finite()).count();
+                let y = measurements.samples(all, samples.pixel, samples.channel);
+                let count = y.iter().filter(|y| y.is_finite()).count();
                 let residual_freedom = count as f64 - x.iter().filter(|&&x| x > 0.0).count() as f64;
                 if count >= MIN_PATTERNS && residual_freedom >= 1.0 {
                     let y = equations.weight(&samples.y);

@@ -183,8 +183,7 @@ impl PooledMeasurements {
         };
         for &(_, pixel) in pixels {
             for c in channels.clone() {
-                let sample = |&l: &usize| measurements.sample(l, pixel, c);
-                let y: Vec<f64> = pattern_indices.iter().map(sample).collect();
+                let y = measurements.samples(pattern_indices, pixel, c);
                 let mean = sampling::mean(&y);
                 // The mean is NaN if a sample is saturated.
                 if mean > 0.0 {

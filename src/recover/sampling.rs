@@ -133,10 +133,15 @@ pub(super) fn usable_samples(
     pixel: CameraPixel,
     c: usize,
 ) -> (Vec<usize>, Vec<f64>) {
-    let usable = unsaturated(measurements, pattern_indices, &[(0, pixel)], c..c + 1);
-    let sample = |&l: &usize| measurements.sample_or_white(l, pixel, c);
-    let y = usable.iter().map(sample).collect();
-    (usable, y)
+    let y = measurements.samples(pattern_indices, pixel, c);
+    let mut samples: Vec<_> = pattern_indices.iter().copied().zip(y).collect();
+    if samples.iter().filter(|(_, y)| y.is_finite()).count() >= MIN_PATTERNS {
+        samples.retain(|(_, y)| y.is_finite());
+    } else {
+        let saturated = samples.iter_mut().filter(|(_, y)| !y.is_finite());
+        saturated.for_each(|(l, y)| *y = measurements.white(*l));
+    }
+    samples.into_iter().unzip()
 }
 
 /// The mean of measurements; 0 of none.

@@ -28,6 +28,11 @@ impl PhotographCorrection {
         shift: [0.0; 2],
     };
 
+    /// That of photograph `l` in a list of corrections, which is empty if no photograph needs one.
+    pub(super) fn of(corrections: &[Self], l: usize) -> Self {
+        corrections.get(l).copied().unwrap_or(Self::IDENTITY)
+    }
+
     /// Whether the picture is shifted.
     pub fn is_shifted(self) -> bool {
         self.shift != [0.0; 2]
@@ -39,7 +44,7 @@ impl PhotographCorrection {
     }
 
     /// The sample before correction.
-    fn invert(self, corrected: f64) -> f64 {
+    pub(super) fn invert(self, corrected: f64) -> f64 {
         (corrected - self.offset) / self.scale
     }
 
@@ -85,8 +90,7 @@ impl<'a> CalibratedMeasurements<'a> {
     }
 
     fn correction(&self, l: usize) -> PhotographCorrection {
-        let correction = self.corrections.get(l).copied();
-        correction.unwrap_or(PhotographCorrection::IDENTITY)
+        PhotographCorrection::of(self.corrections, l)
     }
 
     /// Channel `c` of a pixel under pattern `l`; NaN if saturated or not loaded.
@@ -98,8 +102,15 @@ impl<'a> CalibratedMeasurements<'a> {
         self.correction(l).apply(y)
     }
 
+    /// The same under each of the patterns. Not inlined, as a WebAssembly module would have it many times.
+    #[inline(never)]
+    pub fn samples(&self, pattern_indices: &[usize], pixel: CameraPixel, c: usize) -> Vec<f64> {
+        let sample = |&l: &usize| self.sample(l, pixel, c);
+        pattern_indices.iter().map(sample).collect()
+    }
+
     /// The least that a saturated sample can be.
-    fn white(&self, l: usize) -> f64 {
+    pub fn white(&self, l: usize) -> f64 {
         let white = f64::from(self.measurements.full_scale[l]);
         self.correction(l).apply(white)
     }

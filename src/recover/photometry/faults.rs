@@ -179,8 +179,7 @@ fn add_square(
                 continue;
             };
             for scaled in &pixels {
-                let sample = |&l: &usize| measurements.sample(l, scaled.pixel, scaled.channel);
-                let measured: Vec<f64> = outliers.iter().map(sample).collect();
+                let measured = measurements.samples(outliers, scaled.pixel, scaled.channel);
                 if measured.iter().any(|y| y.is_nan()) {
                     continue;
                 }

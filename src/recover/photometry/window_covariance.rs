@@ -40,6 +40,7 @@ pub(super) struct WindowCovariance {
 }
 
 /// A pixel's channel: measurements divided by its brightness, times its weight.
+#[derive(Clone)]
 pub(super) struct ScaledPixel {
     pub pixel: CameraPixel,
     pub channel: usize,
@@ -139,8 +140,7 @@ impl WindowModel {
             .iter()
             .flat_map(|pixel| channels.clone().map(move |c| (pixel.1, c)));
         let scale = |(pixel, c)| {
-            let sample = |&l: &usize| measurements.sample(l, pixel, c);
-            let mut y: Vec<f64> = pattern_indices.iter().map(sample).collect();
+            let mut y = measurements.samples(pattern_indices, pixel, c);
             let mean = y.iter().sum::<f64>() / count;
             let brightness = mean / level;
             // The mean is NaN if a sample is saturated, and the level is zero off the light plane.
