@@ -512,6 +512,19 @@ fn a_gamma_that_is_declared_wrong_is_told() {
     assert!((gamma - 2.2).abs() < 0.1, "{gamma}");
 }
 
+/// In the photographs of the patterns of a window, all nearly equally bright, it hardly shows; the flood photograph tells it.
+#[test]
+fn compressed_highlights_are_told_from_a_display_that_dims() {
+    for (scene, method) in [("stained-glass", "learned"), ("cookies", "nnls")] {
+        let report = report_of_fault(scene, "compression=1.5", method);
+        let fields = report["estimated_fields"].as_array().unwrap();
+        assert_eq!(fields.len(), 1, "{scene}: {fields:?}");
+        assert_eq!(fields[0]["field"], "camera.response");
+        let slope = number(&fields[0]["estimated"]["compression"]);
+        assert!((slope - 1.5).abs() < 0.1, "{scene}: {slope}");
+    }
+}
+
 #[test]
 fn patterns_that_are_enlarged_smoothly_are_warned_of() {
     let codes = |report: &Value| report["warnings"].to_string();

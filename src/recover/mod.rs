@@ -47,7 +47,7 @@ pub use holdout_validation::HoldoutValidation;
 pub use method::Method;
 pub use nnls::Nnls;
 pub use photometry::{
-    Flicker, MOVED_CODE, PhotographCorrection, PhotographFault, ResponseHypothesis,
+    Flicker, FloodShortfall, MOVED_CODE, PhotographCorrection, PhotographFault, ResponseHypothesis,
 };
 pub use prepared_recovery::{PreparedRecovery, RecoverySettings, find_response};
 pub use sampling::MIN_PATTERNS;

@@ -11,8 +11,8 @@ use super::mean_function;
 use super::method::Method;
 use super::pattern_check;
 use super::photometry::{
-    self, CalibratedMeasurements, Flicker, PhotographCorrection, PhotographFault, Photometry,
-    ResampledPhotographs, ResponseHypothesis,
+    self, CalibratedMeasurements, Flicker, FloodShortfall, PhotographCorrection, PhotographFault,
+    Photometry, ResampledPhotographs, ResponseHypothesis,
 };
 use super::pixelwise::PixelwiseRecovery;
 use super::preparation_input::{self, RecoveryPreparationInput};
@@ -198,13 +198,16 @@ impl PreparedRecovery {
         &self.photometry.faults
     }
 
-    /// Share by which the display dims a picture with all elements lit, and others in proportion to their mean emission,
-    /// as the flood photograph says. `None` if it does not, or if there is no such photograph. `measurements` are those
-    /// that the recovery was prepared from.
-    pub fn dimming(&self, measurements: &Measurements, executor: &impl Executor) -> Option<f64> {
+    /// Why the flood photograph is darker than the patterns predict. `None` if it is not, or if there is no such photograph.
+    /// `measurements` are those that the recovery was prepared from.
+    pub fn flood_shortfall(
+        &self,
+        measurements: &Measurements,
+        executor: &impl Executor,
+    ) -> Option<FloodShortfall> {
         let used = &self.split.all;
         let input = (self.photometry).resampling_input(measurements, &self.geometry, used);
-        photometry::estimate_dimming(input, executor)
+        photometry::find_flood_shortfall(input, executor)
     }
 
     /// Bands of exposure that differ from photograph to photograph, as lamps that flicker cause. `None` if there are none, or

@@ -14,8 +14,8 @@ use crate::export::{
     saturated_percent,
 };
 use crate::recover::{
-    CaptureFault, Flicker, MIN_PATTERNS, MOVED_CODE, PhotographCorrection, PhotographFault,
-    PreparedRecovery, TailEstimate,
+    CaptureFault, Flicker, FloodShortfall, MIN_PATTERNS, MOVED_CODE, PhotographCorrection,
+    PhotographFault, PreparedRecovery, TailEstimate,
 };
 use crate::transport::Decibels;
 
@@ -143,13 +143,19 @@ pub fn flicker(
     )
 }
 
-/// Why a display seems to dim bright pictures by `dimming`.
-pub fn dimming_reason(dimming: f64) -> String {
-    format!(
-        "the flood photograph is darker than the patterns predict: the display dims bright pictures, by {:.1} % when all \
-         elements are lit, unless the flood photograph has less exposure",
-        100.0 * dimming
-    )
+/// Why the flood photograph is dark.
+pub fn flood_shortfall_reason(shortfall: FloodShortfall) -> String {
+    let cause = match shortfall {
+        FloodShortfall::Dimming(dimming) => format!(
+            "the display dims bright pictures, by {:.1} % when all elements are lit, unless the flood photograph has less \
+             exposure",
+            100.0 * dimming
+        ),
+        FloodShortfall::Compression(_) => {
+            "the brighter a pixel, the more; the photographs have compressed highlights".to_owned()
+        }
+    };
+    format!("the flood photograph is darker than the patterns predict: {cause}")
 }
 
 /// Notes pixels that are filled from their neighbours.

@@ -170,7 +170,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         let attempt = self.attempt(sample);
         let attempt = self.with_capture_fault(attempt, findings)?;
         let attempt = self.with_response(attempt, findings)?;
-        let attempt = self.with_dimming(attempt, findings)?;
+        let attempt = self.with_flood_shortfall(attempt, findings)?;
         let sample = &attempt.sample;
         let cores = self.source.cores();
         // Codes that are not linear have less contrast.
@@ -354,8 +354,8 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         Ok(likely.find(|likely| likely != declared))
     }
 
-    /// Looks whether the display dims bright pictures.
-    fn with_dimming(
+    /// Looks whether the display dims bright pictures, or highlights are compressed, as only the flood photograph may tell.
+    fn with_flood_shortfall(
         &self,
         attempt: Attempt<S::Dark>,
         findings: &mut Findings,
@@ -364,19 +364,23 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         else {
             return Ok(attempt);
         };
-        // A wrong response would seem to be dimming.
+        // Another wrong response would seem to be either.
         if !findings.are_responses_right() {
             return Ok(attempt);
         }
-        let measurements = &attempt.sample.measurements;
-        let Some(dimming) = prepared.recovery.dimming(measurements, self.source.cores()) else {
+        let (measurements, cores) = (&attempt.sample.measurements, self.source.cores());
+        let Some(shortfall) = prepared.recovery.flood_shortfall(measurements, cores) else {
             return Ok(attempt);
         };
         let manifest = attempt.sample.folder.manifest();
-        let (amended, mut field) = calibration::with_dimming(manifest, dimming);
+        let Some((amended, mut field)) = calibration::with_flood_shortfall(manifest, shortfall)
+        else {
+            return Ok(attempt);
+        };
         field.is_used = self.settings.trust == TrustedCalibration::Estimated;
         let is_used = field.is_used;
-        let finding = field.finding(&self.manifest_path(), &messages::dimming_reason(dimming));
+        let reason = messages::flood_shortfall_reason(shortfall);
+        let finding = field.finding(&self.manifest_path(), &reason);
         findings.add_estimate(field, finding);
         match is_used {
             true => Ok(self.attempt(self.source.read_by(attempt.sample, amended)?)),

@@ -1,14 +1,19 @@
-//! Whether the display dims bright pictures.
+//! Why the flood photograph is darker than the patterns predict.
 //!
-//! Many displays limit their power: the more elements are lit, the less each emits. Random patterns are all about equally
-//! bright, so that this shows in one photograph only, the flood: it is darker than the patterns predict. Its brightness
-//! relative to its prediction is found by regression over sampled pixels.
+//! Random patterns are all about equally bright, so that two faults hardly show in their photographs, but in that of the
+//! flood. Many displays limit their power: the more elements are lit, the less each emits; then all pixels are darker by
+//! one ratio. Or the photographs have compressed highlights; then pixels are darker the brighter they are. The ratio, and
+//! the compression with which the flood is as bright as predicted, are found by regression over sampled pixels. The fault
+//! is the one with which less of the flood photograph is left unexplained.
 
+use super::PhotographCorrection;
 use super::equations::{for_scaled_pixels, predict};
 use super::resampling::ResamplingInput;
-use super::window_covariance::WindowModel;
+use super::window_covariance::{ScaledPixel, WindowCovariance, WindowModel};
+use crate::bisect::bisect;
+use crate::capture::CameraResponse;
 use crate::job_executor::Executor;
-use crate::recover::mean_function;
+use crate::recover::{mean_function, sampling};
 use crate::transport::TileRect;
 
 /// Least and largest share that is dimming; beyond that, the flood photograph has another exposure.
@@ -16,49 +21,103 @@ const MIN_DIMMING: f64 = 0.02;
 const MAX_DIMMING: f64 = 0.5;
 /// Standard errors by which the flood photograph must be darker.
 const MIN_SIGNIFICANCE: f64 = 5.0;
-/// Sums of products of prediction p, stray light u and measurement: pp, pu, uu, py, uy.
-type Sums = [f64; 5];
+/// Range of the ratio of slopes of compressed highlights, and the halvings that find it.
+const SLOPES: [f64; 2] = [1.0, 4.0];
+const HALVINGS: usize = 10;
+/// Sums of products of prediction p, stray light u and measurement y: pp, pu, uu, py, uy, yy.
+type Sums = [f64; 6];
 
-/// Share by which the display dims a picture with all elements lit, and others in proportion to their mean emission.
+/// What makes the flood photograph darker than the patterns predict.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FloodShortfall {
+    /// The display dims a picture with all elements lit by this share, and others in proportion to their mean emission.
+    Dimming(f64),
+    /// Highlights are compressed: [`CameraResponse::Compression`] with this ratio of slopes.
+    Compression(f64),
+}
+
 /// `None` if the flood photograph is as bright as the patterns predict, brighter, or missing.
-pub(in crate::recover) fn estimate(
+pub(in crate::recover) fn find(
     input: ResamplingInput<'_>,
     executor: &impl Executor,
-) -> Option<f64> {
+) -> Option<FloodShortfall> {
     let measurements = input.measurements;
     if measurements.flood.is_none() || input.mean_function.is_empty() {
         return None;
     }
     let squares = mean_function::sample_squares(measurements);
-    let sums = executor.map(squares.len(), |i| square_sums(input, squares[i]));
-    let total = |left_out: Option<usize>| {
-        let mut total = [0.0; 5];
-        for (_, sums) in sums
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| Some(*i) != left_out)
-        {
-            (0..5).for_each(|k| total[k] += sums[k]);
-        }
-        total
-    };
-    let ratio = relative_brightness(total(None));
+    let declared = sums(input, &squares, CameraResponse::Linear, executor);
+    let ratio = relative_brightness(total(&declared, None));
     // Jackknife over squares.
-    let deviations = (0..sums.len()).map(|i| (relative_brightness(total(Some(i))) - ratio).powi(2));
+    let without = |i| relative_brightness(total(&declared, Some(i)));
+    let deviations = (0..squares.len()).map(|i| (without(i) - ratio).powi(2));
     let error = deviations.sum::<f64>().sqrt();
-    let mean = mean_emission(input);
-    let dimming = (1.0 - ratio) / (1.0 - ratio * mean);
+    let dimming = (1.0 - ratio) / (1.0 - ratio * mean_emission(input));
     let is_significant = 1.0 - ratio > MIN_SIGNIFICANCE * error;
-    (is_significant && (MIN_DIMMING..=MAX_DIMMING).contains(&dimming)).then_some(dimming)
+    if !is_significant || !(MIN_DIMMING..=MAX_DIMMING).contains(&dimming) {
+        return None;
+    }
+    let (slope, unexplained) = compression(input, &squares, executor);
+    match unexplained < unexplained_share(total(&declared, None)) {
+        true => Some(FloodShortfall::Compression(slope)),
+        false => Some(FloodShortfall::Dimming(dimming)),
+    }
+}
+
+/// The ratio of slopes of compressed highlights with which the flood photograph is as bright as the patterns predict, and
+/// the share of it that is then unexplained. An end of [`SLOPES`] if there is none.
+pub(super) fn compression(
+    input: ResamplingInput<'_>,
+    squares: &[TileRect],
+    executor: &impl Executor,
+) -> (f64, f64) {
+    let compressed = |slope| {
+        let response = CameraResponse::Compression(slope);
+        total(&sums(input, squares, response, executor), None)
+    };
+    let is_too_dark = |slope| Ok::<_, ()>(relative_brightness(compressed(slope)) < 1.0);
+    // The search has no errors.
+    let [slope, _] = bisect(SLOPES, HALVINGS, is_too_dark).unwrap_or(SLOPES);
+    (slope, unexplained_share(compressed(slope)))
+}
+
+/// The sums over each square.
+fn sums(
+    input: ResamplingInput<'_>,
+    squares: &[TileRect],
+    response: CameraResponse,
+    executor: &impl Executor,
+) -> Vec<Sums> {
+    executor.map(squares.len(), |i| square_sums(input, squares[i], response))
+}
+
+/// The sums over all squares, or all but one.
+fn total(sums: &[Sums], left_out: Option<usize>) -> Sums {
+    let mut total = [0.0; 6];
+    for (i, sums) in sums.iter().enumerate() {
+        if Some(i) != left_out {
+            (0..6).for_each(|k| total[k] += sums[k]);
+        }
+    }
+    total
 }
 
 /// The weight of the prediction in the regression of the flood photograph on it and on stray light.
-fn relative_brightness([pp, pu, uu, py, uy]: Sums) -> f64 {
+fn relative_brightness([pp, pu, uu, py, uy, _]: Sums) -> f64 {
     (py * uu - uy * pu) / (pp * uu - pu * pu)
 }
 
-fn square_sums(input: ResamplingInput<'_>, square: TileRect) -> Sums {
-    let mut sums = [0.0; 5];
+/// The share of the flood photograph's energy that the regression leaves.
+fn unexplained_share(sums: Sums) -> f64 {
+    let [_, pu, uu, py, uy, yy] = sums;
+    let ratio = relative_brightness(sums);
+    let stray_light = (uy - ratio * pu) / uu;
+    1.0 - (ratio * py + stray_light * uy) / yy
+}
+
+/// Sums over a square of photographs that are linearised by `response`.
+fn square_sums(input: ResamplingInput<'_>, square: TileRect, response: CameraResponse) -> Sums {
+    let mut sums = [0.0; 6];
     for_scaled_pixels(input, square, |origin, window, pixels| {
         let flood = WindowModel::of_flood(input.geometry, input.mean_function, origin);
         for scaled in pixels {
@@ -68,17 +127,38 @@ fn square_sums(input: ResamplingInput<'_>, square: TileRect) -> Sums {
             if measured.is_nan() {
                 continue;
             }
-            let (p, u, y) = (
-                predict(window, &flood, scaled)[0],
-                scaled.unit,
-                scaled.unit * measured,
-            );
-            for (sum, product) in sums.iter_mut().zip([p * p, p * u, u * u, p * y, u * y]) {
-                *sum += product;
-            }
+            let linear = linearised(input, window, scaled, response);
+            let (p, u) = (predict(window, &flood, &linear)[0], linear.unit);
+            let y = u * response.linearise(measured);
+            let products = [p * p, p * u, u * u, p * y, u * y, y * y];
+            (0..6).for_each(|k| sums[k] += products[k]);
         }
     });
     sums
+}
+
+/// The pixel as if its photographs had been linearised before they were corrected. Where pictures are shifted, what the
+/// shift changes is linear as it is.
+fn linearised(
+    input: ResamplingInput<'_>,
+    window: &WindowCovariance,
+    scaled: &ScaledPixel,
+    response: CameraResponse,
+) -> ScaledPixel {
+    let mut linear = scaled.clone();
+    if response == CameraResponse::Linear {
+        return linear;
+    }
+    for (y, &l) in linear.y.iter_mut().zip(input.used) {
+        let correction = PhotographCorrection::of(input.corrections, l);
+        let white = f64::from(input.measurements.full_scale[l]);
+        let code = correction.invert(*y / scaled.unit) / white;
+        *y = correction.apply(white * response.linearise(code));
+    }
+    let level = sampling::mean(&window.model.means);
+    linear.unit = linear.weight * level / sampling::mean(&linear.y);
+    linear.y.iter_mut().for_each(|y| *y *= linear.unit);
+    linear
 }
 
 /// Mean emission of the patterns.

@@ -17,11 +17,11 @@ use crate::capture::Measurements;
 use crate::transport::Geometry;
 
 mod calibrated_measurements;
-mod dimming;
 mod equations;
 mod estimate;
 mod faults;
 mod flicker;
+mod flood_shortfall;
 mod resampling;
 mod response;
 #[cfg(all(test, not(target_arch = "wasm32")))]
@@ -30,12 +30,13 @@ mod window_covariance;
 
 pub(super) use calibrated_measurements::CalibratedMeasurements;
 pub use calibrated_measurements::PhotographCorrection;
-pub(super) use dimming::estimate as estimate_dimming;
 pub(super) use equations::max_bytes;
 pub(super) use estimate::estimate;
 pub use faults::{MOVED_CODE, PhotographFault};
 pub use flicker::Flicker;
 pub(super) use flicker::find as find_flicker;
+pub use flood_shortfall::FloodShortfall;
+pub(super) use flood_shortfall::find as find_flood_shortfall;
 pub(super) use resampling::{
     HALO, ResampledPhotographs, ResamplingInput, max_prepared_bytes, max_tile_bytes,
 };

@@ -7,6 +7,8 @@
 
 use super::CalibratedMeasurements;
 use super::equations::{MAX_PHOTOGRAPHS, for_largest_window};
+use super::flood_shortfall;
+use super::resampling::ResamplingInput;
 use super::window_covariance::{MODEL_VARIANCE, UNEXPLAINED_VARIANCE, WindowModel};
 use crate::capture::{CameraResponse, Measurements, Pattern};
 use crate::job_executor::{Cancelled, Executor};
@@ -139,26 +141,25 @@ impl<E: Executor> ResponseSearch<'_, E> {
         let declared = self.score(declared);
         let camera = |exponent| Hypothesis::Camera(CameraResponse::Gamma(exponent));
         let mut candidates = vec![self.best_parameter(&declared, camera)?];
-        // A curve that is nearly a power may also be that of compressed highlights.
-        if candidates[0].is_better_than(&declared) {
-            let camera = |slope| Hypothesis::Camera(CameraResponse::Compression(slope));
-            candidates.push(self.best_parameter(&declared, camera)?);
-        }
-        // Only a curve of about this exponent can be that of sRGB.
-        if let Hypothesis::Camera(CameraResponse::Gamma(1.4..)) = candidates[0].hypothesis {
-            let srgb = self.score(Hypothesis::Camera(CameraResponse::Srgb));
-            let best = candidates
-                .iter()
-                .map(Scored::mean)
-                .fold(f64::INFINITY, f64::min);
-            if srgb.mean() < best + MIN_ADVANTAGE_OVER_SRGB {
-                candidates = vec![srgb];
-            }
-        }
         let patterns = &self.measurements.patterns;
         if patterns.iter().any(Pattern::has_grey_levels) {
             let display = |exponent| Hypothesis::Display { exponent };
             candidates.push(self.best_parameter(&declared, display)?);
+        }
+        // What is nearly a power, of either, may also be the curve of compressed highlights.
+        if candidates.iter().any(|c| c.is_better_than(&declared)) {
+            candidates.push(self.best_compression(&declared)?);
+        }
+        // Only a curve of about this exponent can be that of sRGB.
+        if let Hypothesis::Camera(CameraResponse::Gamma(1.4..)) = candidates[0].hypothesis {
+            let srgb = self.score(Hypothesis::Camera(CameraResponse::Srgb));
+            let is_of_camera = |c: &Scored| matches!(c.hypothesis, Hypothesis::Camera(_));
+            let of_camera = candidates.iter().filter(|c| is_of_camera(c));
+            let best = of_camera.map(Scored::mean).fold(f64::INFINITY, f64::min);
+            if srgb.mean() < best + MIN_ADVANTAGE_OVER_SRGB {
+                candidates.retain(|c| !is_of_camera(c));
+                candidates.push(srgb);
+            }
         }
         candidates.retain(|scored| scored.hypothesis.is_far() && scored.is_better_than(&declared));
         candidates.sort_by(|a, b| a.mean().total_cmp(&b.mean()));
@@ -166,6 +167,27 @@ impl<E: Executor> ResponseSearch<'_, E> {
             .into_iter()
             .map(|scored| scored.hypothesis)
             .collect())
+    }
+
+    /// The flood photograph, if there is one, tells compressed highlights best.
+    fn best_compression(&self, declared: &Scored) -> Result<Scored, Cancelled> {
+        let camera = |slope| Hypothesis::Camera(CameraResponse::Compression(slope));
+        if self.measurements.flood.is_some() {
+            let input = ResamplingInput {
+                measurements: &self.measurements,
+                corrections: &[],
+                geometry: self.geometry,
+                mean_function: self.mean_function,
+                softness: 0.0,
+                used: self.used,
+            };
+            let (slope, _) = flood_shortfall::compression(input, &self.squares, self.executor);
+            let scored = self.score(camera(slope));
+            if scored.is_better_than(declared) {
+                return Ok(scored);
+            }
+        }
+        self.best_parameter(declared, camera)
     }
 
     /// The exponent, or ratio of slopes, with the lowest prediction errors: by steps as long as these fall, then by parabolas

@@ -296,7 +296,11 @@ fn a_flood_photograph_that_is_dimmed_tells_by_how_much() {
         let photometry = photometry_of(&capture);
         let used: Vec<usize> = (0..PATTERNS).collect();
         let input = photometry.resampling_input(&capture.measurements, &capture.geometry, &used);
-        estimate_dimming(input, &SequentialExecutor)
+        match find_flood_shortfall(input, &SequentialExecutor) {
+            Some(FloodShortfall::Dimming(dimming)) => Some(dimming),
+            Some(compression) => panic!("{compression:?}"),
+            None => None,
+        }
     };
     for stray in [0.0, 0.02] {
         assert_eq!(dimming(1.0, stray), None);
