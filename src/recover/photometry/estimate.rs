@@ -38,8 +38,9 @@ const MAX_SHIFT_ERROR: f64 = 0.05;
 /// Distance in camera pixels above which photographs are left out if all others were taken from one place: they would add
 /// less than resampling takes away.
 const MIN_MOVE: f64 = 0.35;
-/// Values of the softness of interpolation that are compared, at equal distances; the first is used before.
-const SOFTNESSES: [f64; 3] = [0.0, 0.5, 1.0];
+/// Distance between the values of the softness of interpolation that are compared, from 0 to 1; 0 is used before.
+const SOFTNESS_STEP: f64 = 0.5;
+const SOFTNESSES: usize = 3;
 /// Steps of the shifts after the softness is known.
 const STEPS_AFTER_SOFTNESS: usize = 2;
 /// Steps of the shifts of photographs that are tried once more.
@@ -80,7 +81,7 @@ pub(in crate::recover) async fn estimate(
     let mut photometry = Photometry {
         mean_function: mean_function::smooth(mean_function, side),
         corrections: vec![PhotographCorrection::IDENTITY; count],
-        softness: SOFTNESSES[0],
+        softness: 0.0,
         faults: Vec::new(),
     };
     let mut used: Vec<usize> = (0..count).collect();
@@ -90,8 +91,10 @@ pub(in crate::recover) async fn estimate(
     let mut readmission_steps = 0;
     let max_outliers = (MAX_OUTLIER_SHARE * count as f64) as usize;
     let (mut steps, mut shift_steps) = (0, 0);
-    // Unexplained shares with the softnesses that were tried.
-    let (mut softness_shares, mut tried_softnesses) = ([0.0; 3], 0);
+    // Unexplained shares with the softnesses that were tried, and these.
+    let mut tried: Vec<(f64, f64)> = Vec::new();
+    // Shifts depend on the softness.
+    let mut are_adjusted = false;
     let last = loop {
         preparation.executor.check_cancelled()?;
         let input = photometry.resampling_input(measurements, &preparation.geometry, &used);
@@ -99,13 +102,14 @@ pub(in crate::recover) async fn estimate(
         let Some(step) = step else {
             return Ok(Photometry::default());
         };
-        if (1..SOFTNESSES.len()).contains(&tried_softnesses) {
-            softness_shares[tried_softnesses] = step.unexplained_share;
-            tried_softnesses += 1;
-            photometry.softness = match tried_softnesses < SOFTNESSES.len() {
-                true => SOFTNESSES[tried_softnesses],
-                false => best_softness(softness_shares),
-            };
+        if (1..=SOFTNESSES).contains(&tried.len()) {
+            are_adjusted = !are_adjusted;
+            if are_adjusted {
+                step.apply_shifts(&used, &mut photometry.corrections, &used);
+                continue;
+            }
+            tried.push((step.unexplained_share, photometry.softness));
+            photometry.softness = next_softness(&tried);
             (steps, shift_steps) = (0, MAX_SHIFT_STEPS - STEPS_AFTER_SOFTNESS);
             continue;
         }
@@ -123,10 +127,9 @@ pub(in crate::recover) async fn estimate(
         if found.is_empty() && shift_steps < MAX_SHIFT_STEPS && step.has_shifts() {
             step.apply_shifts(&used, &mut photometry.corrections, &used);
             (steps, shift_steps) = (0, shift_steps + 1);
-        } else if found.is_empty() && shift_steps > 0 && tried_softnesses == 0 {
-            softness_shares[0] = step.unexplained_share;
-            photometry.softness = SOFTNESSES[1];
-            tried_softnesses = 1;
+        } else if found.is_empty() && shift_steps > 0 && tried.is_empty() {
+            tried.push((step.unexplained_share, photometry.softness));
+            photometry.softness = next_softness(&tried);
         } else if !found.is_empty() {
             if outliers.len() + found.len() > max_outliers {
                 return Ok(Photometry::default());
@@ -196,12 +199,21 @@ pub(in crate::recover) async fn estimate(
     Ok(photometry)
 }
 
-/// The softness with which the least of the differences between photographs is unexplained, by the shares that are
-/// unexplained with [`SOFTNESSES`]. Interpolated pictures depend on it linearly, so that shares lie on a parabola.
-fn best_softness(shares: [f64; 3]) -> f64 {
-    let (step, difference) = (SOFTNESSES[1], shares[2] - shares[0]);
-    let curvature = (shares[0] - 2.0 * shares[1] + shares[2]).max(f64::MIN_POSITIVE);
-    (step - 0.5 * step * difference / curvature).clamp(0.0, 1.0)
+/// The softness to try after those that were tried, which are given after their unexplained shares: those at equal
+/// distances, then the minimum of the parabola through their shares. At last the one with the least share.
+fn next_softness(tried: &[(f64, f64)]) -> f64 {
+    match *tried {
+        [(a, _), (b, _), (c, _)] => {
+            let curvature = (a - 2.0 * b + c).max(f64::MIN_POSITIVE);
+            let minimum = SOFTNESS_STEP - 0.5 * SOFTNESS_STEP * (c - a) / curvature;
+            minimum.clamp(0.0, 1.0)
+        }
+        [_, _, _, ..] => {
+            let lesser = |a: (f64, f64), b: &(f64, f64)| if b.0 < a.0 { *b } else { a };
+            tried.iter().fold((f64::INFINITY, 0.0), lesser).1
+        }
+        _ => SOFTNESS_STEP * tried.len() as f64,
+    }
 }
 
 impl CorrectionStep {

@@ -52,7 +52,7 @@ pub struct Photometry {
     /// needed to recover tiles elsewhere.
     #[serde(skip)]
     pub faults: Vec<(usize, PhotographFault)>,
-    /// How softly shifted pictures interpolate: 0 as cubic splines, 1 as straight lines.
+    /// How softly shifted pictures interpolate: 0 as cubic splines, ½ as by cubic convolution, 1 as straight lines.
     pub softness: f64,
     /// The mean function that shifted photographs are [resampled](resampling) with, `[slot]`.
     pub mean_function: Vec<f64>,

@@ -348,10 +348,11 @@ const TAPS: usize = 2 * RADIUS as usize;
 /// Weights that interpolate along one axis, and the distance of the first of their pixels.
 type Taps = ([f64; TAPS], i64);
 
-/// Interpolates at a place shifted by `-d`, by the cardinal cubic spline (Unser, Splines: a perfect fit for signal and image
-/// processing, 1999), cut off where it has fallen to a hundredth, and with the weight `softness` by a straight line. How a
-/// picture changes when the camera moves depends on how sharp it is: splines suit a smooth picture, and straight lines one
-/// whose edges are sharper than its pixels.
+/// Interpolates at a place shifted by `-d`. How a picture changes when the camera moves depends on how sharp it is, and on
+/// what has interpolated it before. At a `softness` of 0 by the cardinal cubic spline (Unser, Splines: a perfect fit for
+/// signal and image processing, 1999), cut off where it has fallen to a hundredth, which suits a smooth picture; at ½ by
+/// cubic convolution (Keys 1981); at 1 by a straight line, which suits edges sharper than the pixels. Between them by the
+/// parabola through these three.
 fn taps(d: f64, softness: f64) -> Taps {
     let cell = (-d).floor();
     let fraction = -d - cell;
@@ -359,11 +360,20 @@ fn taps(d: f64, softness: f64) -> Taps {
     let mut taps: [f64; TAPS] = std::array::from_fn(|k| {
         let x = fraction - (first + k as i64) as f64;
         let line = (1.0 - x.abs()).max(0.0);
-        (1.0 - softness) * cardinal_spline(x) + softness * line
+        let (rest, twice) = (1.0 - softness, 2.0 * softness);
+        rest * ((1.0 - twice) * cardinal_spline(x) + 2.0 * twice * cubic_convolution(x))
+            - softness * (1.0 - twice) * line
     });
     let sum: f64 = taps.iter().sum();
     taps.iter_mut().for_each(|tap| *tap /= sum);
     (taps, cell as i64 + first)
+}
+
+fn cubic_convolution(x: f64) -> f64 {
+    let x = x.abs();
+    let beyond = ((2.0 - x).max(0.0) * (1.0 - x)).min(0.0) * (2.0 - x);
+    let line = (1.0 - x).max(0.0);
+    0.5 * beyond + line * (1.0 + x - 1.5 * x * x)
 }
 
 fn cardinal_spline(x: f64) -> f64 {
@@ -414,6 +424,9 @@ mod tests {
             let curve = |x: f64| (0.9 * x + 0.4).sin();
             let smooth = value(0.0, &curve);
             assert!((smooth - curve(-d)).abs() < 0.006, "{d}: {smooth}");
+            // Cubic convolution is exact for parabolas.
+            let parabola = |x: f64| 0.3 * x * x - x;
+            assert!((value(0.5, &parabola) - parabola(-d)).abs() < 1e-12, "{d}");
             let edge = |x: f64| if x > 0.5 { 1.0 } else { 0.0 };
             let soft = value(1.0, &edge);
             assert!((soft - (-d).max(0.0)).abs() < 1e-12, "{d}: {soft}");
