@@ -590,7 +590,20 @@ fn a_bad_manifest_is_refused_by_field() {
                 drop(m["camera"].as_object_mut().unwrap().remove("white"))
             })
         },
-        &["capture.json", "missing field `white`"],
+        &["capture.json: \"camera.white\" is missing"],
+    );
+    assert_refused(
+        |c| {
+            edit_manifest(c, |m| {
+                let camera = m["camera"].as_object_mut().unwrap();
+                let white = camera.remove("white").unwrap();
+                camera.insert("whtie".to_owned(), white);
+            })
+        },
+        &[
+            "\"camera.white\" is missing",
+            "correct the name of \"camera.whtie\" to \"white\"",
+        ],
     );
     assert_refused(
         |c| edit_manifest(c, |m| m["correspondence"]["affine"][0][2] = 1e6.into()),

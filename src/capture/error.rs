@@ -50,7 +50,15 @@ pub enum CaptureErrorKind {
     /// The manifest has an unknown version.
     #[error("\"version\" is {0}; this program reads version 1")]
     UnknownVersion(u64),
-    /// A field of the manifest, given as a path into the JSON, has the wrong type or lacks a member.
+    /// A field of the manifest that must be there is not.
+    #[error("\"{field}\" is missing")]
+    MissingField {
+        /// The field, as a path into the JSON.
+        field: String,
+        /// Paths of unknown fields: one may be this field, misspelt.
+        unknown: Vec<String>,
+    },
+    /// A field of the manifest, given as a path into the JSON, has the wrong type.
     #[error("\"{0}\" is invalid: {1}")]
     FieldType(String, serde_json::Error),
     /// A number or string in the manifest is outside its range.

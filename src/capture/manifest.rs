@@ -296,12 +296,21 @@ impl Manifest {
         let mut add_unknown = |field: serde_ignored::Path| unknown.push(field.to_string());
         let deserializer = serde_ignored::Deserializer::new(&mut source, &mut add_unknown);
         let parsed: Result<Self, _> = serde_path_to_error::deserialize(deserializer);
-        let manifest = parsed.map_err(|e| match e.path().to_string() {
-            field if e.path().iter().next().is_some() => {
-                error(CaptureErrorKind::FieldType(field, e.into_inner()))
+        let manifest = match parsed {
+            Ok(manifest) => manifest,
+            Err(e) => {
+                let at = Some(e.path().to_string()).filter(|_| e.path().iter().next().is_some());
+                let reason = e.into_inner();
+                return Err(match (missing_field(&reason), at) {
+                    (Some(name), at) => {
+                        let field = at.map_or(name.clone(), |at| format!("{at}.{name}"));
+                        error(CaptureErrorKind::MissingField { field, unknown })
+                    }
+                    (None, Some(at)) => error(CaptureErrorKind::FieldType(at, reason)),
+                    (None, None) => json_error(reason),
+                });
             }
-            _ => json_error(e.into_inner()),
-        })?;
+        };
         source.end().map_err(json_error)?;
         Ok(Self {
             unknown,
@@ -489,6 +498,13 @@ fn interpolate(table: &[[f64; 2]], x: f64) -> f64 {
     }
 }
 
+/// The name of the field that serde says is missing.
+fn missing_field(error: &serde_json::Error) -> Option<String> {
+    let text = error.to_string();
+    let (name, _) = text.strip_prefix("missing field `")?.split_once('`')?;
+    Some(name.to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -555,14 +571,20 @@ mod tests {
             assert!(message.contains("x/capture.json"), "{message}");
         }
         let missing = manifest(|j| j["camera"] = serde_json::json!({"width": 8}));
-        let CaptureErrorKind::FieldType(field, reason) = missing.unwrap_err().problem else {
+        let error = missing.unwrap_err().to_string();
+        assert!(error.ends_with("\"camera.height\" is missing"), "{error}");
+        let misspelt = manifest(|j| {
+            j["shots"][0] = serde_json::json!({"pattern": "a.png", "photot": "b.png"});
+        });
+        let CaptureErrorKind::MissingField { field, unknown } = misspelt.unwrap_err().problem
+        else {
             panic!("a different error")
         };
-        assert_eq!(field, "camera");
-        assert!(
-            reason.to_string().contains("missing field `height`"),
-            "{reason}"
-        );
+        assert_eq!(field, "shots[0].photo");
+        assert_eq!(unknown, ["shots.0.photot"]);
+        let missing = manifest(|j| drop(j.as_object_mut().unwrap().remove("light")));
+        let error = missing.unwrap_err().to_string();
+        assert!(error.ends_with("\"light\" is missing"), "{error}");
     }
 
     #[test]

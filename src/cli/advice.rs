@@ -4,16 +4,40 @@ use std::error::Error;
 
 use anyhow::Error as AnyError;
 
+use super::field_suggestion::similar_fields;
 use crate::calibrate::CalibrationError;
+use crate::capture::{CaptureError, CaptureErrorKind};
 use crate::export::capture_remedy;
 use crate::recover::RecoverError;
 
 /// The text of `error` and its causes, followed by the remedy if there is one.
 pub fn error_with_remedy(error: &AnyError) -> String {
+    let remedy = |error: &(dyn Error + 'static)| {
+        let misspelt = error.downcast_ref().and_then(misspelt_field);
+        misspelt.or_else(|| remedy(error).map(str::to_owned))
+    };
     match error.chain().find_map(remedy) {
         Some(remedy) => format!("{error:#}; {remedy}"),
         None => format!("{error:#}"),
     }
+}
+
+/// Names the field that a missing one was probably misspelt as.
+pub fn misspelt_field(error: &CaptureError) -> Option<String> {
+    let CaptureErrorKind::MissingField { field, unknown } = &error.problem else {
+        return None;
+    };
+    let field = field.replace('[', ".").replace(']', "");
+    let (object, name) = split_path(&field);
+    let resembles =
+        |path: &&String| split_path(path).0 == object && similar_fields(path).contains(&name);
+    let misspelt = unknown.iter().find(resembles)?;
+    Some(format!("correct the name of \"{misspelt}\" to \"{name}\""))
+}
+
+/// The path of the object that a field is in, and the field's name.
+fn split_path(path: &str) -> (&str, &str) {
+    path.rsplit_once('.').unwrap_or(("", path))
 }
 
 fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {

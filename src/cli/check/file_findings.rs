@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::capture::{CaptureError, CaptureErrorKind, CaptureFolder, PhotographRole};
+use crate::cli::advice::misspelt_field;
 use crate::cli::finding::{Finding, Severity};
 use crate::cli::recover::messages;
 use crate::export::capture_remedy;
@@ -133,7 +134,8 @@ fn group_finding(root: &Path, group: &[&FileFault]) -> Finding {
 }
 
 fn with_remedy(text: String, error: &CaptureError) -> String {
-    match capture_remedy(error) {
+    let remedy = misspelt_field(error).or_else(|| capture_remedy(error).map(str::to_owned));
+    match remedy {
         Some(remedy) => format!("{text}; {remedy}"),
         None => text,
     }
@@ -144,6 +146,7 @@ fn code(problem: &CaptureErrorKind) -> &'static str {
     match problem {
         Kind::NotACapture(_) | Kind::NotAManifest(_) | Kind::UnknownVersion(_) => "manifest",
         Kind::FieldType(..)
+        | Kind::MissingField { .. }
         | Kind::OutOfRange { .. }
         | Kind::MissingResponse
         | Kind::ConflictingResponse

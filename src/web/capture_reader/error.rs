@@ -23,6 +23,7 @@ impl From<CaptureError> for CodedError {
             | Kind::MissingGrayCode { .. }
             | Kind::NotAManifest(_)
             | Kind::FieldType(..)
+            | Kind::MissingField { .. }
             | Kind::OutOfRange { .. }
             | Kind::InvalidResponse
             | Kind::NotInvertible
