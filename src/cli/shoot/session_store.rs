@@ -72,7 +72,7 @@ pub struct SessionStore {
     pub sequence: PatternSequence,
     records: Vec<Option<PhotographRecord>>,
     /// Of this process alone.
-    _lock: File,
+    _lock: SessionLock,
 }
 
 /// One photograph in the log of a session.
@@ -286,13 +286,23 @@ impl SessionStore {
     }
 }
 
+/// A locked file. It is unlocked explicitly, as a program that is just being started may still have the file open.
+struct SessionLock(File);
+
+impl Drop for SessionLock {
+    fn drop(&mut self) {
+        // Closing the file unlocks it as well.
+        let _ = self.0.unlock();
+    }
+}
+
 /// Two programs in one folder would take each other's photographs.
-fn lock(work: &Path) -> Result<File> {
+fn lock(work: &Path) -> Result<SessionLock> {
     let path = work.join("lock");
-    let lock = || -> Result<File> {
+    let lock = || -> Result<SessionLock> {
         let file = File::create(&path)?;
         match file.try_lock() {
-            Ok(()) => Ok(file),
+            Ok(()) => Ok(SessionLock(file)),
             Err(TryLockError::WouldBlock) => {
                 bail!("another `ltm-export shoot` photographs this session; end it first")
             }
