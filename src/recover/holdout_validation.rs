@@ -198,15 +198,15 @@ fn variances(
     let (mut signal, mut noise) = (0.0, 0.0);
     for pixel in rect.pixels() {
         for c in 0..CHANNELS {
-            // The variance of samples, and the mean of their noise's.
-            let variances = |l: &[usize]| {
+            // The variance of samples, and the mean variance of their noise.
+            let of_patterns = |l: &[usize]| {
                 let y = measurements.samples(l, pixel, c);
                 let samples = l.iter().zip(&y);
                 let noise = samples.map(|(&l, &y)| measurements.variance(l, c, y));
                 (variance(y.iter().copied()), finite_mean(noise))
             };
             let ((Some(_), of_held_out), (total, of_all)) =
-                (variances(&split.held_out), variances(&split.all))
+                (of_patterns(&split.held_out), of_patterns(&split.all))
             else {
                 continue;
             };

@@ -74,8 +74,8 @@ impl PixelwiseRecovery {
         let mut error = SnrAccumulator::default();
         let elements: Vec<_> = self.geometry.elements_of_window(window.0).collect();
         let mut add = |_: &WindowEquations, samples: &PixelSamples, x: &[f64]| {
-            let held_out = measurements.samples(&split.held_out, samples.pixel, samples.channel);
-            for (&l, y) in split.held_out.iter().zip(held_out) {
+            for &l in &split.held_out {
+                let y = measurements.sample(l, samples.pixel, samples.channel);
                 if y.is_finite() {
                     let plane = measurements.patterns[l].plane(samples.channel);
                     let terms = elements.iter().zip(x);

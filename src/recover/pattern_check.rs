@@ -143,18 +143,21 @@ fn add_window(
         let predictions: Vec<f64> = (0..measurements.patterns.len()).map(predict).collect();
         let pixels = pixels.iter();
         for (pixel, c) in pixels.flat_map(|p| channels.clone().map(move |c| (p.1, c))) {
-            let sample = |l: usize| measurements.sample(l, pixel, c);
             let [mut predicted, mut measured, mut count] = [0.0; 3];
-            for &l in split.training.iter().filter(|&&l| sample(l).is_finite()) {
-                predicted += predictions[l];
-                measured += sample(l);
-                count += 1.0;
+            let training = measurements.samples(&split.training, pixel, c);
+            for (&l, y) in split.training.iter().zip(training) {
+                if y.is_finite() {
+                    predicted += predictions[l];
+                    measured += y;
+                    count += 1.0;
+                }
             }
             if !(predicted > 0.0 && measured > 0.0) {
                 continue;
             }
-            for &l in &split.all {
-                let (moments, deviation) = (&mut moments[l], sample(l) - measured / count);
+            let all = measurements.samples(&split.all, pixel, c);
+            for (&l, y) in split.all.iter().zip(all) {
+                let (moments, deviation) = (&mut moments[l], y - measured / count);
                 if deviation.is_finite() {
                     let prediction = measured / predicted * (predictions[l] - predicted / count);
                     moments.prediction += prediction * prediction;

@@ -29,6 +29,7 @@ use crate::transport::{Basis, FloatTile, Geometry, TileRect, Window};
 pub async fn find_response(
     measurements: &Measurements,
     window: Window,
+    flood_white: f64,
     executor: &impl Executor,
 ) -> Result<Vec<ResponseHypothesis>, RecoverError> {
     let geometry = preparation_input::geometry(measurements, window)?;
@@ -46,6 +47,7 @@ pub async fn find_response(
         &geometry,
         &mean,
         &split.all,
+        flood_white,
         executor,
     )?)
 }
@@ -199,15 +201,17 @@ impl PreparedRecovery {
     }
 
     /// Why the flood photograph is darker than the patterns predict. `None` if it is not, or if there is no such photograph.
-    /// `measurements` are those that the recovery was prepared from.
+    /// `measurements` are those that the recovery was prepared from, and `flood_white` the one at which the flood
+    /// photograph is white.
     pub fn flood_shortfall(
         &self,
         measurements: &Measurements,
+        flood_white: f64,
         executor: &impl Executor,
     ) -> Option<FloodShortfall> {
         let used = &self.split.all;
         let input = (self.photometry).resampling_input(measurements, &self.geometry, used);
-        photometry::find_flood_shortfall(input, executor)
+        photometry::find_flood_shortfall(input, flood_white, executor)
     }
 
     /// Bands of exposure that differ from photograph to photograph, as lamps that flicker cause. `None` if there are none, or
@@ -231,16 +235,24 @@ impl PreparedRecovery {
     pub async fn response(
         &self,
         measurements: &Measurements,
+        flood_white: f64,
         executor: &impl Executor,
     ) -> Result<Vec<ResponseHypothesis>, RecoverError> {
         let mean_function = &self.photometry.mean_function;
         // Photometry found the photographs too different from what their patterns predict.
         if mean_function.is_empty() {
-            return find_response(measurements, self.geometry.window, executor).await;
+            let window = self.geometry.window;
+            return find_response(measurements, window, flood_white, executor).await;
         }
         let used = &self.split.all;
-        let found =
-            photometry::find_response(measurements, &self.geometry, mean_function, used, executor);
+        let found = photometry::find_response(
+            measurements,
+            &self.geometry,
+            mean_function,
+            used,
+            flood_white,
+            executor,
+        );
         Ok(found?)
     }
 

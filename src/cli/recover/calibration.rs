@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::capture::{CameraResponse, CodeStatistics, Manifest};
 use crate::cli::finding::Finding;
-use crate::recover::{FloodShortfall, ResponseHypothesis};
+use crate::recover::ResponseHypothesis;
 use crate::transport::{CHANNELS, Decibels};
 
 /// Exponents and ratios of slopes are rounded to hundredths.
@@ -150,24 +150,16 @@ pub fn changed_responses(declared: &Manifest, estimated: &Manifest) -> Vec<Estim
     all.into_iter().filter(is_changed).collect()
 }
 
-/// The manifest with what makes the flood photograph dark. `None` if that has no name after the declared response.
-pub fn with_flood_shortfall(
-    manifest: &Manifest,
-    shortfall: FloodShortfall,
-) -> Option<(Manifest, EstimatedField)> {
-    match shortfall {
-        FloodShortfall::Dimming(dimming) => Some(with_dimming(manifest, dimming)),
-        FloodShortfall::Compression(slope) => {
-            let response = ResponseHypothesis::Camera(CameraResponse::Compression(slope));
-            let amended = with_response(manifest, response);
-            let field = changed_responses(manifest, &amended).pop()?;
-            Some((amended, field))
-        }
-    }
+/// The manifest with compressed highlights. `None` if that has no name after the declared response.
+pub fn with_compression(manifest: &Manifest, slope: f64) -> Option<(Manifest, EstimatedField)> {
+    let response = ResponseHypothesis::Camera(CameraResponse::Compression(slope));
+    let amended = with_response(manifest, response);
+    let field = changed_responses(manifest, &amended).pop()?;
+    Some((amended, field))
 }
 
 /// The manifest with a display that dims.
-fn with_dimming(manifest: &Manifest, dimming: f64) -> (Manifest, EstimatedField) {
+pub fn with_dimming(manifest: &Manifest, dimming: f64) -> (Manifest, EstimatedField) {
     let mut amended = manifest.clone();
     let declared = amended.light.dimming;
     // The patterns are dimmed as declared.

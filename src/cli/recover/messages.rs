@@ -14,8 +14,8 @@ use crate::export::{
     saturated_percent,
 };
 use crate::recover::{
-    CaptureFault, Flicker, FloodShortfall, MIN_PATTERNS, MOVED_CODE, PhotographCorrection,
-    PhotographFault, PreparedRecovery, TailEstimate,
+    CaptureFault, Flicker, MIN_PATTERNS, MOVED_CODE, PhotographCorrection, PhotographFault,
+    PreparedRecovery, TailEstimate,
 };
 use crate::transport::Decibels;
 
@@ -143,17 +143,17 @@ pub fn flicker(
     )
 }
 
-/// Why the flood photograph is dark.
-pub fn flood_shortfall_reason(shortfall: FloodShortfall) -> String {
-    let cause = match shortfall {
-        FloodShortfall::Dimming(dimming) => format!(
+/// Why the flood photograph is dark: by dimming, or by compressed highlights.
+pub fn flood_shortfall_reason(dimming: Option<f64>) -> String {
+    let cause = match dimming {
+        Some(dimming) => format!(
             "the display dims bright pictures, by {:.1} % when all elements are lit, unless the flood photograph has less \
              exposure",
             100.0 * dimming
         ),
-        FloodShortfall::Compression(_) => {
-            "the brighter a pixel, the more; the photographs have compressed highlights".to_owned()
-        }
+        None => "bright pixels fall short by a larger share than dim ones, as the photographs have compressed \
+             highlights"
+            .to_owned(),
     };
     format!("the flood photograph is darker than the patterns predict: {cause}")
 }

@@ -334,11 +334,12 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     fn likely_manifest(&self, attempt: &Attempt<S::Dark>) -> Result<Option<Manifest>> {
         let (sample, cores) = (&attempt.sample, self.source.cores());
         let measurements = &sample.measurements;
+        let white = flood_white(sample.folder.manifest());
         let _spinner = progress::spinner("testing responses");
         let found = pollster::block_on(async {
             match &attempt.prepared {
-                Ok(prepared) => prepared.recovery.response(measurements, cores).await,
-                Err(_) => find_response(measurements, self.window(), cores).await,
+                Ok(prepared) => prepared.recovery.response(measurements, white, cores).await,
+                Err(_) => find_response(measurements, self.window(), white, cores).await,
             }
         });
         let found = match found {
@@ -369,17 +370,26 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
             return Ok(attempt);
         }
         let (measurements, cores) = (&attempt.sample.measurements, self.source.cores());
-        let Some(shortfall) = prepared.recovery.flood_shortfall(measurements, cores) else {
-            return Ok(attempt);
-        };
-        let manifest = attempt.sample.folder.manifest();
-        let Some((amended, mut field)) = calibration::with_flood_shortfall(manifest, shortfall)
+        let manifest = attempt.sample.folder.manifest().clone();
+        let white = flood_white(&manifest);
+        let Some(shortfall) = (prepared.recovery).flood_shortfall(measurements, white, cores)
         else {
             return Ok(attempt);
         };
-        field.is_used = self.settings.trust == TrustedCalibration::Estimated;
-        let is_used = field.is_used;
-        let reason = messages::flood_shortfall_reason(shortfall);
+        let is_used = self.settings.trust == TrustedCalibration::Estimated;
+        let is_estimated = !findings.estimated_fields.is_empty();
+        let compression = shortfall.compression.filter(|_| !is_estimated);
+        let compressed = compression.and_then(|s| calibration::with_compression(&manifest, s));
+        let (amended, mut field, reason) = match compressed {
+            Some((amended, field)) => (amended, field, messages::flood_shortfall_reason(None)),
+            None => {
+                let dimming = shortfall.dimming;
+                let (amended, field) = calibration::with_dimming(&manifest, dimming);
+                let reason = messages::flood_shortfall_reason(Some(dimming));
+                (amended, field, reason)
+            }
+        };
+        field.is_used = is_used;
         let finding = field.finding(&self.manifest_path(), &reason);
         findings.add_estimate(field, finding);
         match is_used {
@@ -424,6 +434,11 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
             other => Error::new(other).context(self.folder.root().display().to_string()),
         }
     }
+}
+
+/// The measurement at which the flood photograph is white: it is read as if the display did not dim.
+fn flood_white(manifest: &Manifest) -> f64 {
+    (1.0 - manifest.light.dimming.unwrap_or(0.0)).recip()
 }
 
 /// The place in a list of shifts after which they differ from those before by more than their scatter.

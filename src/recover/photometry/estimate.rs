@@ -91,10 +91,10 @@ pub(in crate::recover) async fn estimate(
     let mut readmission_steps = 0;
     let max_outliers = (MAX_OUTLIER_SHARE * count as f64) as usize;
     let (mut steps, mut shift_steps) = (0, 0);
-    // Unexplained shares with the softnesses that were tried, and these.
+    // Softnesses that were tried, each after its unexplained share.
     let mut tried: Vec<(f64, f64)> = Vec::new();
-    // Shifts depend on the softness.
-    let mut are_adjusted = false;
+    // Whether the shifts were estimated with the softness that is tried.
+    let mut shifts_fit_softness = false;
     let last = loop {
         preparation.executor.check_cancelled()?;
         let input = photometry.resampling_input(measurements, &preparation.geometry, &used);
@@ -103,8 +103,8 @@ pub(in crate::recover) async fn estimate(
             return Ok(Photometry::default());
         };
         if (1..=SOFTNESSES).contains(&tried.len()) {
-            are_adjusted = !are_adjusted;
-            if are_adjusted {
+            shifts_fit_softness = !shifts_fit_softness;
+            if shifts_fit_softness {
                 step.apply_shifts(&used, &mut photometry.corrections, &used);
                 continue;
             }

@@ -1,10 +1,10 @@
 //! Why the flood photograph is darker than the patterns predict.
 //!
-//! Random patterns are all about equally bright, so that two faults hardly show in their photographs, but in that of the
-//! flood. Many displays limit their power: the more elements are lit, the less each emits; then all pixels are darker by
-//! one ratio. Or the photographs have compressed highlights; then pixels are darker the brighter they are. The ratio, and
-//! the compression with which the flood is as bright as predicted, are found by regression over sampled pixels. The fault
-//! is the one with which less of the flood photograph is left unexplained.
+//! Random patterns are all about equally bright, so that two faults hardly show in their photographs, only in the flood's.
+//! Many displays limit their power: the more elements are lit, the less each emits; then all pixels are darker by one
+//! ratio, which follows by regression over sampled pixels. Or the photographs have compressed highlights; then bright
+//! pixels fall short by a larger share than dim ones. Bisection finds the compression with which the ratio is 1. It is the
+//! cause if it leaves far less of the flood photograph unexplained.
 
 use super::PhotographCorrection;
 use super::equations::{for_scaled_pixels, predict};
@@ -24,21 +24,25 @@ const MIN_SIGNIFICANCE: f64 = 5.0;
 /// Range of the ratio of slopes of compressed highlights, and the halvings that find it.
 const SLOPES: [f64; 2] = [1.0, 4.0];
 const HALVINGS: usize = 10;
+/// Largest share of the flood photograph that compression leaves unexplained, relative to what dimming leaves.
+const MAX_UNEXPLAINED_RATIO: f64 = 0.5;
 /// Sums of products of prediction p, stray light u and measurement y: pp, pu, uu, py, uy, yy.
 type Sums = [f64; 6];
 
-/// What makes the flood photograph darker than the patterns predict.
+/// What may make the flood photograph darker than the patterns predict.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FloodShortfall {
-    /// The display dims a picture with all elements lit by this share, and others in proportion to their mean emission.
-    Dimming(f64),
-    /// Highlights are compressed: [`CameraResponse::Compression`] with this ratio of slopes.
-    Compression(f64),
+pub struct FloodShortfall {
+    /// Share by which the display dims a picture with all elements lit, and others in proportion to their mean emission.
+    pub dimming: f64,
+    /// Ratio of slopes of [`CameraResponse::Compression`], if compressed highlights explain the flood photograph better.
+    pub compression: Option<f64>,
 }
 
-/// `None` if the flood photograph is as bright as the patterns predict, brighter, or missing.
+/// `None` if the flood photograph is as bright as the patterns predict, brighter, or missing. `flood_white` is the
+/// measurement at which its samples are white.
 pub(in crate::recover) fn find(
     input: ResamplingInput<'_>,
+    flood_white: f64,
     executor: &impl Executor,
 ) -> Option<FloodShortfall> {
     let measurements = input.measurements;
@@ -46,7 +50,11 @@ pub(in crate::recover) fn find(
         return None;
     }
     let squares = mean_function::sample_squares(measurements);
-    let declared = sums(input, &squares, CameraResponse::Linear, executor);
+    let sums = |response| {
+        let sums_of = |i: usize| square_sums(input, squares[i], flood_white, response);
+        executor.map(squares.len(), sums_of)
+    };
+    let declared = sums(CameraResponse::Linear);
     let ratio = relative_brightness(total(&declared, None));
     // Jackknife over squares.
     let without = |i| relative_brightness(total(&declared, Some(i)));
@@ -57,38 +65,17 @@ pub(in crate::recover) fn find(
     if !is_significant || !(MIN_DIMMING..=MAX_DIMMING).contains(&dimming) {
         return None;
     }
-    let (slope, unexplained) = compression(input, &squares, executor);
-    match unexplained < unexplained_share(total(&declared, None)) {
-        true => Some(FloodShortfall::Compression(slope)),
-        false => Some(FloodShortfall::Dimming(dimming)),
-    }
-}
-
-/// The ratio of slopes of compressed highlights with which the flood photograph is as bright as the patterns predict, and
-/// the share of it that is then unexplained. An end of [`SLOPES`] if there is none.
-pub(super) fn compression(
-    input: ResamplingInput<'_>,
-    squares: &[TileRect],
-    executor: &impl Executor,
-) -> (f64, f64) {
-    let compressed = |slope| {
-        let response = CameraResponse::Compression(slope);
-        total(&sums(input, squares, response, executor), None)
-    };
+    let compressed = |slope| total(&sums(CameraResponse::Compression(slope)), None);
     let is_too_dark = |slope| Ok::<_, ()>(relative_brightness(compressed(slope)) < 1.0);
     // The search has no errors.
-    let [slope, _] = bisect(SLOPES, HALVINGS, is_too_dark).unwrap_or(SLOPES);
-    (slope, unexplained_share(compressed(slope)))
-}
-
-/// The sums over each square.
-fn sums(
-    input: ResamplingInput<'_>,
-    squares: &[TileRect],
-    response: CameraResponse,
-    executor: &impl Executor,
-) -> Vec<Sums> {
-    executor.map(squares.len(), |i| square_sums(input, squares[i], response))
+    let [_, slope] = bisect(SLOPES, HALVINGS, is_too_dark).unwrap_or(SLOPES);
+    let unexplained = unexplained_share(compressed(slope));
+    let is_cause = slope < SLOPES[1]
+        && unexplained < MAX_UNEXPLAINED_RATIO * unexplained_share(total(&declared, None));
+    Some(FloodShortfall {
+        dimming,
+        compression: is_cause.then_some(slope),
+    })
 }
 
 /// The sums over all squares, or all but one.
@@ -116,7 +103,12 @@ fn unexplained_share(sums: Sums) -> f64 {
 }
 
 /// Sums over a square of photographs that are linearised by `response`.
-fn square_sums(input: ResamplingInput<'_>, square: TileRect, response: CameraResponse) -> Sums {
+fn square_sums(
+    input: ResamplingInput<'_>,
+    square: TileRect,
+    flood_white: f64,
+    response: CameraResponse,
+) -> Sums {
     let mut sums = [0.0; 6];
     for_scaled_pixels(input, square, |origin, window, pixels| {
         let flood = WindowModel::of_flood(input.geometry, input.mean_function, origin);
@@ -129,7 +121,7 @@ fn square_sums(input: ResamplingInput<'_>, square: TileRect, response: CameraRes
             }
             let linear = linearised(input, window, scaled, response);
             let (p, u) = (predict(window, &flood, &linear)[0], linear.unit);
-            let y = u * response.linearise(measured);
+            let y = u * flood_white * response.linearise(measured / flood_white);
             let products = [p * p, p * u, u * u, p * y, u * y, y * y];
             (0..6).for_each(|k| sums[k] += products[k]);
         }
@@ -137,8 +129,8 @@ fn square_sums(input: ResamplingInput<'_>, square: TileRect, response: CameraRes
     sums
 }
 
-/// The pixel as if its photographs had been linearised before they were corrected. Where pictures are shifted, what the
-/// shift changes is linear as it is.
+/// The pixel as if its photographs had been linearised before they were corrected: to first order, as corrections are those
+/// of photographs as declared, and changes by shifts are linearised with them.
 fn linearised(
     input: ResamplingInput<'_>,
     window: &WindowCovariance,

@@ -51,7 +51,7 @@ pub enum ResponseHypothesis {
 use ResponseHypothesis as Hypothesis;
 
 /// Looks for responses with which the photographs `used` predict one another better than with the declared one, the best
-/// first; `mean_function` is `[slot]`, smoothed. Empty if there is none, or too little is measured to tell.
+/// first; `mean_function` is `[slot]`, smoothed, and `flood_white` the measurement at which the flood photograph is white. Empty if there is none, or too little is measured to tell.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -60,6 +60,7 @@ pub(in crate::recover) fn find(
     geometry: &Geometry,
     mean_function: &[f64],
     used: &[usize],
+    flood_white: f64,
     executor: &impl Executor,
 ) -> Result<Vec<ResponseHypothesis>, Cancelled> {
     let squares = mean_function::sample_squares(measurements);
@@ -73,6 +74,7 @@ pub(in crate::recover) fn find(
         geometry,
         mean_function,
         used,
+        flood_white,
         squares,
         executor,
     };
@@ -99,6 +101,7 @@ struct ResponseSearch<'a, E> {
     geometry: &'a Geometry,
     mean_function: &'a [f64],
     used: &'a [usize],
+    flood_white: f64,
     squares: Vec<TileRect>,
     executor: &'a E,
 }
@@ -169,7 +172,7 @@ impl<E: Executor> ResponseSearch<'_, E> {
             .collect())
     }
 
-    /// The flood photograph, if there is one, tells compressed highlights best.
+    /// If the flood photograph tells compressed highlights, it does so best.
     fn best_compression(&self, declared: &Scored) -> Result<Scored, Cancelled> {
         let camera = |slope| Hypothesis::Camera(CameraResponse::Compression(slope));
         if self.measurements.flood.is_some() {
@@ -181,10 +184,12 @@ impl<E: Executor> ResponseSearch<'_, E> {
                 softness: 0.0,
                 used: self.used,
             };
-            let (slope, _) = flood_shortfall::compression(input, &self.squares, self.executor);
-            let scored = self.score(camera(slope));
-            if scored.is_better_than(declared) {
-                return Ok(scored);
+            let shortfall = flood_shortfall::find(input, self.flood_white, self.executor);
+            if let Some(slope) = shortfall.and_then(|shortfall| shortfall.compression) {
+                let scored = self.score(camera(slope));
+                if scored.is_better_than(declared) {
+                    return Ok(scored);
+                }
             }
         }
         self.best_parameter(declared, camera)
@@ -372,7 +377,7 @@ mod tests {
         let mut capture = SyntheticCapture::with_variation(PATTERNS, 0.1);
         change(&mut capture.measurements);
         let window = capture.geometry.window;
-        let found = find_response(&capture.measurements, window, &SequentialExecutor);
+        let found = find_response(&capture.measurements, window, 1.0, &SequentialExecutor);
         let found = pollster::block_on(found).unwrap_or_else(|error| panic!("{error}"));
         found.first().copied()
     }

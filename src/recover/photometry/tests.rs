@@ -296,11 +296,9 @@ fn a_flood_photograph_that_is_dimmed_tells_by_how_much() {
         let photometry = photometry_of(&capture);
         let used: Vec<usize> = (0..PATTERNS).collect();
         let input = photometry.resampling_input(&capture.measurements, &capture.geometry, &used);
-        match find_flood_shortfall(input, &SequentialExecutor) {
-            Some(FloodShortfall::Dimming(dimming)) => Some(dimming),
-            Some(compression) => panic!("{compression:?}"),
-            None => None,
-        }
+        let shortfall = find_flood_shortfall(input, 1.0, &SequentialExecutor)?;
+        assert_eq!(shortfall.compression, None);
+        Some(shortfall.dimming)
     };
     for stray in [0.0, 0.02] {
         assert_eq!(dimming(1.0, stray), None);
