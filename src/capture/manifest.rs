@@ -445,7 +445,7 @@ impl PhotographRole {
 /// A photograph that a manifest names.
 #[derive(Clone, Copy, Debug)]
 pub struct ListedPhotograph<'a> {
-    /// What it is.
+    /// Its role.
     pub role: PhotographRole,
     /// Its file.
     pub name: &'a str,

@@ -25,7 +25,7 @@ const POSITION_BYTES: u64 = 64;
 
 /// Median of the residuals, in light elements, above which the Gray code is wrong: scattering leaves about one.
 const MAX_RESIDUAL: f64 = 2.0;
-/// What is wrong then.
+/// The error of such a fit.
 pub const IMPLAUSIBLE_FIT: &str = "the Gray code fits no smooth correspondence, as half of the camera pixels lie more than two \
                                    light elements from it. Is each photograph that of its bit, none exchanged with its inverse, \
                                    and is the object nearly flat?";

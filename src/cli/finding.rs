@@ -1,4 +1,4 @@
-//! What is wrong with a capture, doubtful, or worth knowing.
+//! Errors, warnings and notes about a capture.
 
 use std::fmt;
 
@@ -34,7 +34,7 @@ pub struct Finding {
     pub code: &'static str,
     /// Indices in the manifest's `shots`; none if it is not about some of them.
     pub shots: Vec<usize>,
-    /// What it is, and what helps.
+    /// The problem, and its remedy.
     pub message: String,
 }
 

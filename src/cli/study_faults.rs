@@ -219,7 +219,7 @@ impl<'a> FaultStudy<'a> {
         Ok(Ok((report, evaluated.snr_db)))
     }
 
-    /// What is reported of captures without faults.
+    /// The findings about captures without faults.
     fn false_alarms(&self) -> Result<String> {
         let mut alarms = Vec::new();
         let mut count = 0;

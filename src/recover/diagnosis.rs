@@ -33,7 +33,7 @@ const MAX_MOVE: i32 = 8;
 const BLOB_RADIUS: i32 = 3;
 const BLOB_SIGMA: f64 = 1.2;
 
-/// What is wrong with a capture as a whole.
+/// A fault of a capture as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CaptureFault {
     /// From photograph `first` on, each shows the pattern of the shot that is listed `by` positions later (earlier if
@@ -128,7 +128,7 @@ pub fn diagnose(
     Ok(search.moved(&responses))
 }
 
-/// What is searched for a cause.
+/// The measurements that a cause is searched in.
 struct Search<'a, E> {
     measurements: &'a Measurements,
     shots: &'a [usize],

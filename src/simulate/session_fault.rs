@@ -13,7 +13,7 @@ use super::separable_filter::{blurred, shifted};
 use crate::capture::{LinearPhoto, Manifest};
 use crate::transport::{CHANNELS, Extent};
 
-/// What goes wrong.
+/// The kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SessionFaultKind {
     /// One photograph has this share of its exposure.
@@ -110,7 +110,7 @@ const KINDS: [(&str, Kind, Option<f64>); 23] = [
 /// A fault and its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SessionFault {
-    /// What goes wrong.
+    /// Its kind.
     pub kind: SessionFaultKind,
     /// How much; see [`SessionFaultKind`]. Not used by kinds without a size.
     pub size: f64,
@@ -290,7 +290,7 @@ impl SessionFault {
         self.kind == Kind::Mirror
     }
 
-    /// Whether the fault is in what is declared, not in the photographs.
+    /// Whether the manifest has the fault, and not the photographs.
     pub fn is_declared(self) -> bool {
         matches!(self.kind, Kind::Mirror | Kind::Gamma)
     }
@@ -304,7 +304,7 @@ impl SessionFault {
         is_of_several || self.is_declared()
     }
 
-    /// Changes what is declared.
+    /// Changes the manifest.
     pub fn change_manifest(self, manifest: &mut Manifest) {
         match self.kind {
             Kind::Mirror => {

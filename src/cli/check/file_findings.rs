@@ -54,7 +54,7 @@ impl FileFault {
         }
     }
 
-    /// What is alike in faults that one finding tells.
+    /// The properties that faults of one finding share.
     fn key(&self) -> (Severity, &'static str, String) {
         let problem = &self.error.problem;
         (self.severity, code(problem), problem.to_string())

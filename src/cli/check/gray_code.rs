@@ -1,4 +1,4 @@
-//! The Gray code of a scanned capture: the correspondence, and what is wrong with it.
+//! The Gray code of a scanned capture: the correspondence, and its faults.
 
 use std::cell::RefCell;
 

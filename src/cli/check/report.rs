@@ -54,7 +54,7 @@ pub struct ExaminedCapture {
     pub estimated_fields: Vec<EstimatedField>,
 }
 
-/// What was found of one shot.
+/// The findings of one shot.
 #[derive(Serialize)]
 pub struct ShotReport {
     /// Index in `shots`.

@@ -119,7 +119,7 @@ impl<'a> ScannedCapture<'a> {
         Ok((capture, errors))
     }
 
-    /// What was read of a photograph; `None` if it is not listed, or cannot be read.
+    /// The statistics of a photograph; `None` if it is not listed, or cannot be read.
     pub fn scan(&self, role: PhotographRole) -> Option<&PhotographScan> {
         match role {
             PhotographRole::Dark => self.dark.as_ref(),

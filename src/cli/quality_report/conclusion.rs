@@ -26,7 +26,7 @@ const MIN_EDGE_CORRELATION: f64 = 0.5;
 /// SNR of the file against the recovered transport, less that of the transport, below which compression shows in held-out
 /// photographs.
 const MIN_FILE_LEAD: f64 = 15.0;
-/// What is said of a capture that is not that of the file.
+/// The remark on a capture that is not that of the file.
 pub const OTHER_INPUTS: &str = "the photographs, the patterns or the manifest are not what they were when the file was recovered: is this \
                                 its capture? If not, nothing here is of the file";
 
@@ -36,7 +36,7 @@ pub struct FileQuality {
     pub transport_snr: Option<Decibels>,
     /// SNR of the file against the recovered transport.
     pub file_snr: Option<Decibels>,
-    /// Whether the capture is what it was then.
+    /// Whether the capture is unchanged since then.
     pub are_inputs_unchanged: Option<bool>,
 }
 

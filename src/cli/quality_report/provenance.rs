@@ -25,7 +25,7 @@ pub struct CaptureOrigin {
     pub shooting: Option<Value>,
     /// The manifest, and everything that the recovery read.
     pub inputs: Vec<HashedFile>,
-    /// Whether these are what they were then; null of files that do not say so.
+    /// Whether these are unchanged since then; null of files that do not say so.
     pub are_inputs_unchanged: Option<bool>,
 }
 

@@ -1,4 +1,4 @@
-//! What is found in a capture while a recovery is prepared.
+//! Findings about a capture from the preparation of its recovery.
 
 use anyhow::Result;
 
@@ -6,7 +6,7 @@ use super::calibration::EstimatedField;
 use super::messages::StrictError;
 use crate::cli::finding::{Finding, Severity};
 
-/// What has been found so far.
+/// The findings so far.
 #[derive(Default)]
 pub struct Findings {
     pub list: Vec<Finding>,

@@ -414,7 +414,7 @@ fn drift(gains: &[(usize, f64)]) -> Option<f64> {
     (is_significant && drift.abs() > MIN_NOTED_DEVIATION).then_some(drift)
 }
 
-/// What is wrong with a capture that has `fault`; `shots` are those of the measurements.
+/// The fault of a capture as a whole; `shots` are those of the measurements.
 pub fn capture_fault(
     folder: &CaptureFolder,
     shots: &[usize],

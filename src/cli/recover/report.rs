@@ -58,13 +58,13 @@ pub struct RecoverReport {
     pub warnings: Vec<Finding>,
 }
 
-/// What was found of one photograph.
+/// The findings of one photograph.
 #[derive(Serialize)]
 pub struct PhotographReport {
     /// Index in `shots`.
     pub shot: usize,
     pub photo: String,
-    /// Exposure relative to what is declared, and to the other photographs.
+    /// Exposure relative to the declared one, and to the other photographs.
     pub gain: f64,
     /// Light in the photograph that does not come from the light plane, as a share of white.
     pub stray_light: f64,

@@ -47,7 +47,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(25);
 const SETTLED: Duration = Duration::from_millis(1000);
 /// File of what a command prints.
 const MESSAGES: &str = "messages";
-/// What is told of a command's messages: the first ones.
+/// Length of a command's messages that is printed.
 const MAX_MESSAGE_BYTES: u64 = 4096;
 const MAX_MESSAGE_CHARACTERS: usize = 300;
 
@@ -91,7 +91,7 @@ pub enum CameraError {
     Failed {
         /// How it ended.
         status: ExitStatus,
-        /// What it printed.
+        /// Its messages.
         messages: String,
     },
     /// It wrote nothing.
@@ -99,9 +99,9 @@ pub enum CameraError {
     NoPhotograph {
         /// Where it should be.
         file: PathBuf,
-        /// What it wrote instead.
+        /// The files that it wrote instead.
         others: String,
-        /// What it printed.
+        /// Its messages.
         messages: String,
     },
     /// Which is that of the picture?

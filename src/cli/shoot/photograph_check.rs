@@ -50,7 +50,7 @@ pub struct Fault {
 #[derive(Debug, Default)]
 pub struct Verdict {
     pub faults: Vec<Fault>,
-    /// What is remarkable of it.
+    /// Remarks on it.
     pub remarks: Vec<String>,
 }
 

@@ -40,7 +40,7 @@ pub struct ShootingSettings {
     pub timeout: Duration,
     /// Photographs of a picture, at most.
     pub attempts: u32,
-    /// Keep what is still wrong after that.
+    /// Keep a photograph that still has faults then.
     pub force: bool,
     pub develop: DevelopSettings,
 }

@@ -39,7 +39,7 @@ pub struct PageState {
     pub version: u64,
     /// The picture to show; none before the first.
     pub show: Option<ShownPicture>,
-    /// What is being done, for the operator.
+    /// The present step, for the operator.
     pub message: String,
     /// The last photograph's histogram of each channel, from black to white.
     pub histogram: Vec<Vec<u32>>,

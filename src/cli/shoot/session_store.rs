@@ -27,7 +27,7 @@ const ORIGINALS: &str = "originals";
 const WORK: &str = ".shoot";
 /// Its settings.
 const SETTINGS: &str = "settings.json";
-/// What was photographed when, which stays.
+/// The times of all photographs, which stay.
 pub const LOG_NAME: &str = "shooting.json";
 
 /// What all photographs of a session have in common.
@@ -62,7 +62,7 @@ pub struct PhotographRecord {
     pub taken: String,
     /// Photographs until it was accepted.
     pub attempts: u32,
-    /// What was wrong with the others, or is remarkable of this one.
+    /// Faults of the others, or remarks on this one.
     pub remarks: Vec<String>,
 }
 
@@ -253,7 +253,7 @@ impl SessionStore {
         })
     }
 
-    /// Writes what was photographed when.
+    /// Writes the times of all photographs.
     pub fn write_log(&self, settings: &SessionSettings) -> Result<()> {
         let pictures = self.sequence.pictures.iter().zip(&self.records);
         let photographs = pictures.filter_map(|(picture, record)| {

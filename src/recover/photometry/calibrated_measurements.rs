@@ -48,7 +48,7 @@ impl PhotographCorrection {
         (corrected - self.offset) / self.scale
     }
 
-    /// The photograph's exposure relative to what is declared.
+    /// The photograph's exposure relative to the declared one.
     pub fn gain(self) -> f64 {
         self.scale.recip()
     }

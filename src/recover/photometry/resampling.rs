@@ -49,7 +49,7 @@ pub(in crate::recover) fn max_tile_bytes(photographs: usize, halo: u32) -> usize
     side * side * photographs * (3 * size_of::<[f64; CHANNELS]>() + size_of::<[f32; CHANNELS]>())
 }
 
-/// What resampling starts from: the measurements, and what has been estimated of them.
+/// The measurements, and the estimates that resampling depends on.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::recover) struct ResamplingInput<'a> {
     pub measurements: &'a Measurements,
@@ -348,8 +348,8 @@ const TAPS: usize = 2 * RADIUS as usize;
 /// Weights that interpolate along one axis, and the distance of the first of their pixels.
 type Taps = ([f64; TAPS], i64);
 
-/// Interpolates at a place shifted by `-d`. How a picture changes when the camera moves depends on how sharp it is, and on
-/// what has interpolated it before. At a `softness` of 0 by the cardinal cubic spline (Unser, Splines: a perfect fit for
+/// Interpolates at a place shifted by `-d`. How a picture changes when the camera moves depends on its sharpness, and on
+/// earlier interpolation. At a `softness` of 0 by the cardinal cubic spline (Unser, Splines: a perfect fit for
 /// signal and image processing, 1999), cut off where it has fallen to a hundredth, which suits a smooth picture; at ½ by
 /// cubic convolution (Keys 1981); at 1 by a straight line, which suits edges sharper than the pixels. Between them by the
 /// parabola through these three.

@@ -149,7 +149,7 @@ impl<E: Executor> ResponseSearch<'_, E> {
             let display = |exponent| Hypothesis::Display { exponent };
             candidates.push(self.best_parameter(&declared, display)?);
         }
-        // What is nearly a power, of either, may also be the curve of compressed highlights.
+        // A curve of compressed highlights resembles a power, of either.
         if candidates.iter().any(|c| c.is_better_than(&declared)) {
             candidates.push(self.best_compression(&declared)?);
         }
