@@ -4,7 +4,7 @@ use std::error::Error;
 
 use anyhow::Error as AnyError;
 
-use super::field_suggestion::similar_fields;
+use super::field_suggestion::{similar_fields, split_path};
 use crate::calibrate::CalibrationError;
 use crate::capture::{CaptureError, CaptureErrorKind};
 use crate::export::capture_remedy;
@@ -12,18 +12,19 @@ use crate::recover::RecoverError;
 
 /// The text of `error` and its causes, followed by the remedy if there is one.
 pub fn error_with_remedy(error: &AnyError) -> String {
-    let remedy = |error: &(dyn Error + 'static)| {
-        let misspelt = error.downcast_ref().and_then(misspelt_field);
-        misspelt.or_else(|| remedy(error).map(str::to_owned))
-    };
     match error.chain().find_map(remedy) {
         Some(remedy) => format!("{error:#}; {remedy}"),
         None => format!("{error:#}"),
     }
 }
 
+/// What removes the problem of a capture: the right name of a misspelt field, or the library's remedy.
+pub fn remedy_of_capture(error: &CaptureError) -> Option<String> {
+    misspelt_field(error).or_else(|| capture_remedy(error).map(str::to_owned))
+}
+
 /// Names the field that a missing one was probably misspelt as.
-pub fn misspelt_field(error: &CaptureError) -> Option<String> {
+fn misspelt_field(error: &CaptureError) -> Option<String> {
     let CaptureErrorKind::MissingField { field, unknown } = &error.problem else {
         return None;
     };
@@ -35,22 +36,18 @@ pub fn misspelt_field(error: &CaptureError) -> Option<String> {
     Some(format!("correct the name of \"{misspelt}\" to \"{name}\""))
 }
 
-/// The path of the object that a field is in, and the field's name.
-fn split_path(path: &str) -> (&str, &str) {
-    path.rsplit_once('.').unwrap_or(("", path))
-}
-
-fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
+fn remedy(error: &(dyn Error + 'static)) -> Option<String> {
     if let Some(error) = error.downcast_ref() {
-        return capture_remedy(error);
+        return remedy_of_capture(error);
     }
-    Some(match error.downcast_ref() {
+    let remedy = match error.downcast_ref() {
         Some(CalibrationError::MissingBits(_)) => "photograph them, or give \"correspondence\"",
         Some(CalibrationError::TooFewPixels { .. }) => {
             "photograph the Gray code again with more light, or give \"correspondence\""
         }
-        None => return error.downcast_ref().and_then(recovery_remedy),
-    })
+        None => error.downcast_ref().and_then(recovery_remedy)?,
+    };
+    Some(remedy.to_owned())
 }
 
 fn recovery_remedy(error: &RecoverError) -> Option<&'static str> {

@@ -42,7 +42,7 @@ const MAX_MISTAKES: usize = 2;
 
 /// The fields that the unknown field at `path` resembles most, such as `white` for `camera.whiet`.
 pub fn similar_fields(path: &str) -> Vec<&'static str> {
-    let (object, name) = path.rsplit_once('.').unwrap_or(("", path));
+    let (object, name) = split_path(path);
     let is_index = |part: &str| part.chars().all(|c| c.is_ascii_digit());
     let object = match object.split_once('.') {
         Some((list, index)) if is_index(index) => format!("{list}[]"),
@@ -60,6 +60,11 @@ pub fn similar_fields(path: &str) -> Vec<&'static str> {
     similar
         .filter(|field| Some(mistakes(field)) == least)
         .collect()
+}
+
+/// The path of the object that a field is in, and the field's name.
+pub fn split_path(path: &str) -> (&str, &str) {
+    path.rsplit_once('.').unwrap_or(("", path))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::assemble::read_sequence;
@@ -142,13 +143,7 @@ fn photograph_picture(args: &PhotographArgs, folder: &Path, path: &Path) -> Resu
     for fault in &args.faults {
         fault.change_emissions(light, &mut lights, &mut [], &mut random);
     }
-    let channels: Vec<_> = (0..CHANNELS)
-        .map(|c| channel_pictures(&truth, c, &lights))
-        .collect();
-    let mut pictures = interleave(&channels);
-    for fault in &args.faults {
-        fault.change_pictures(truth.camera, &mut pictures, &mut random);
-    }
+    let mut pictures = faulty_pictures(args, &truth, &lights, &mut random);
     let picture = pictures.first_mut().context("no picture")?;
     let gain = (args.exposure.seconds / REFERENCE_EXPOSURE) as f32;
     picture
@@ -200,13 +195,7 @@ fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
     {
         emissions[i] = light;
     }
-    let channels: Vec<_> = (0..CHANNELS)
-        .map(|c| channel_pictures(&truth, c, &emissions))
-        .collect();
-    let mut pictures = interleave(&channels);
-    for fault in &args.faults {
-        fault.change_pictures(truth.camera, &mut pictures, &mut random);
-    }
+    let pictures = faulty_pictures(args, &truth, &emissions, &mut random);
     output_folder::write_atomically(&args.output, |root| {
         pictures
             .par_iter()
@@ -232,6 +221,23 @@ fn known_transport(args: &PhotographArgs, folder: &CaptureFolder) -> Result<Grou
         "has no truth/ folder, so its transport is unknown and it cannot be photographed again";
     let truth = folder.truth()?.context(missing);
     truth.with_context(|| args.capture.display().to_string())
+}
+
+/// The pictures under grey lights, `[picture][M]`, in the order in which they are taken, with the faults of pictures.
+fn faulty_pictures(
+    args: &PhotographArgs,
+    truth: &GroundTruth,
+    lights: &[Vec<f32>],
+    random: &mut ChaCha8Rng,
+) -> Vec<LinearPhoto> {
+    let channels: Vec<_> = (0..CHANNELS)
+        .map(|c| channel_pictures(truth, c, lights))
+        .collect();
+    let mut pictures = interleave(&channels);
+    for fault in &args.faults {
+        fault.change_pictures(truth.camera, &mut pictures, random);
+    }
+    pictures
 }
 
 /// The codes of photograph `i`, with noise and faults.

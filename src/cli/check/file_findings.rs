@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crate::capture::{CaptureError, CaptureErrorKind, CaptureFolder, PhotographRole};
-use crate::cli::advice::misspelt_field;
+use crate::cli::advice::remedy_of_capture;
 use crate::cli::finding::{Finding, Severity};
 use crate::cli::recover::messages;
-use crate::export::capture_remedy;
 
 /// Maximum number of files that a finding names.
 const MAX_NAMED_FILES: usize = 12;
@@ -134,8 +133,7 @@ fn group_finding(root: &Path, group: &[&FileFault]) -> Finding {
 }
 
 fn with_remedy(text: String, error: &CaptureError) -> String {
-    let remedy = misspelt_field(error).or_else(|| capture_remedy(error).map(str::to_owned));
-    match remedy {
+    match remedy_of_capture(error) {
         Some(remedy) => format!("{text}; {remedy}"),
         None => text,
     }

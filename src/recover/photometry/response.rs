@@ -51,7 +51,8 @@ pub enum ResponseHypothesis {
 use ResponseHypothesis as Hypothesis;
 
 /// Looks for responses with which the photographs `used` predict one another better than with the declared one, the best
-/// first; `mean_function` is `[slot]`, smoothed, and `flood_white` the measurement at which the flood photograph is white. Empty if there is none, or too little is measured to tell.
+/// first; `mean_function` is `[slot]`, smoothed, and `flood_white` the measurement at which the flood photograph is white.
+/// Empty if there is none, or too little is measured to tell.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -175,22 +176,19 @@ impl<E: Executor> ResponseSearch<'_, E> {
     /// If the flood photograph tells compressed highlights, it does so best.
     fn best_compression(&self, declared: &Scored) -> Result<Scored, Cancelled> {
         let camera = |slope| Hypothesis::Camera(CameraResponse::Compression(slope));
-        if self.measurements.flood.is_some() {
-            let input = ResamplingInput {
-                measurements: &self.measurements,
-                corrections: &[],
-                geometry: self.geometry,
-                mean_function: self.mean_function,
-                softness: 0.0,
-                used: self.used,
-            };
-            let shortfall = flood_shortfall::find(input, self.flood_white, self.executor);
-            if let Some(slope) = shortfall.and_then(|shortfall| shortfall.compression) {
-                let scored = self.score(camera(slope));
-                if scored.is_better_than(declared) {
-                    return Ok(scored);
-                }
-            }
+        let input = ResamplingInput {
+            measurements: &self.measurements,
+            corrections: &[],
+            geometry: self.geometry,
+            mean_function: self.mean_function,
+            softness: 0.0,
+            used: self.used,
+        };
+        let shortfall = flood_shortfall::find(input, self.flood_white, self.executor);
+        let slope = shortfall.and_then(|shortfall| shortfall.compression);
+        let scored = slope.map(|slope| self.score(camera(slope)));
+        if let Some(scored) = scored.filter(|scored| scored.is_better_than(declared)) {
+            return Ok(scored);
         }
         self.best_parameter(declared, camera)
     }
