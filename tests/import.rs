@@ -68,7 +68,16 @@ fn a_session_of_another_program_is_imported_calibrated_and_recovered() {
         (affine[0][0].as_f64().unwrap() - 32.0 / 48.0).abs() < 0.01,
         "{affine}"
     );
-    succeed(&["recover", &capture, "-o", &file, "--patterns", "60"]);
+    succeed(&[
+        "recover",
+        &capture,
+        "-o",
+        &file,
+        "--patterns",
+        "60",
+        "--window",
+        "9",
+    ]);
     let report = json(&succeed(&["evaluate", &file, &capture, "--json"]));
     let held_out = report["heldout_fitted_snr_db"].as_f64().unwrap();
     assert!(held_out > 24.0, "{report}");
@@ -131,7 +140,7 @@ fn a_correspondence_that_bends_is_found_and_kept_in_the_file() {
         ]
         .concat(),
     );
-    succeed(&["recover", &capture, "-o", &given]);
+    succeed(&["recover", &capture, "-o", &given, "--window", "9"]);
     let error = fail(&["calibrate", &capture]);
     assert!(error.contains("--force"), "{error}");
     remove_field(&capture, "correspondence");
@@ -143,7 +152,7 @@ fn a_correspondence_that_bends_is_found_and_kept_in_the_file() {
         residual("residual") < 0.9 * residual("affine_residual"),
         "{report}"
     );
-    succeed(&["recover", &capture, "-o", &found]);
+    succeed(&["recover", &capture, "-o", &found, "--window", "9"]);
     let snrs = [&given, &found].map(|file| snr(file, &capture));
     assert!(snrs[1] > snrs[0] - 0.5, "{snrs:?}");
     let inspected = json(&succeed(&["inspect", &found, "--json"]));

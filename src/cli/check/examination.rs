@@ -8,15 +8,14 @@ use super::scanned_capture::ScannedCapture;
 use crate::capture::{CaptureFolder, group_count, group_ids};
 use crate::cli::advice::error_with_remedy;
 use crate::cli::finding::{Finding, Severity};
-use crate::cli::progress;
-use crate::cli::recover::capture_sample::{CaptureSample, PhotographSource};
+use crate::cli::recover::capture_sample::CaptureSample;
 use crate::cli::recover::findings::Findings;
 use crate::cli::recover::preparation::{
     Attempt, CapturePreparation, MIN_USABLE_SNR, PreparationSettings,
 };
 use crate::cli::recover::report::{PhotographReport, photograph_reports};
 use crate::cli::recover::{TrustedCalibration, messages};
-use crate::export::{self, MIN_PLAUSIBLE_SNR, PreparedExport};
+use crate::export::PreparedExport;
 use crate::recover::{Method, RecoverError};
 use crate::transport::Window;
 
@@ -42,7 +41,9 @@ impl<'a> Examination<'a> {
         let sample = self.scanned.sample(self.folder.clone(), shots)?;
         let preparation = CapturePreparation {
             settings: PreparationSettings {
-                method: self.method(&sample)?,
+                // Least squares take the least time and memory.
+                method: Method::Nnls,
+                fallback: Some(Method::Learned),
                 window: self.window,
                 trust: TrustedCalibration::Declared,
             },
@@ -53,6 +54,7 @@ impl<'a> Examination<'a> {
             sample,
             prepared,
             cause,
+            ..
         } = preparation.examine(sample, findings)?;
         let prepared = self.conclude(&preparation, &sample, prepared, cause, findings);
         self.add_pixels_and_noise(&sample, findings);
@@ -85,22 +87,6 @@ impl<'a> Examination<'a> {
             estimated_fields: findings.estimated_fields.clone(),
         };
         Ok((examined, reports.unwrap_or_default()))
-    }
-
-    /// The method to examine the photographs by: least squares, which take the least time and memory, unless they predict
-    /// held-out patterns so badly that nothing could be told from it. Then the method that `recover` uses by default.
-    fn method(&self, sample: &CaptureSample<()>) -> Result<Method> {
-        let _spinner = progress::spinner("learning");
-        let (measurements, cores) = (&sample.measurements, self.scanned.cores());
-        let prepared = export::prepare(measurements, Method::Nnls, self.window, cores);
-        let snr = match pollster::block_on(prepared) {
-            Err(RecoverError::Cancelled(cancelled)) => return Err(cancelled.into()),
-            prepared => prepared.ok().and_then(|prepared| prepared.expected_snr()),
-        };
-        Ok(match snr.is_some_and(|snr| snr < MIN_PLAUSIBLE_SNR) {
-            true => Method::Learned,
-            false => Method::Nnls,
-        })
     }
 
     /// Adds whether `recover` would refuse the capture, and why.

@@ -42,6 +42,8 @@ pub struct PreparedCapture<D> {
 #[derive(Clone, Copy)]
 pub struct PreparationSettings {
     pub method: Method,
+    /// The method to use instead if the first predicts held-out patterns so badly that nothing could be told from it.
+    pub fallback: Option<Method>,
     /// `None` to estimate it.
     pub window: Option<Window>,
     pub trust: TrustedCalibration,
@@ -51,6 +53,7 @@ impl PreparationSettings {
     pub fn of(args: &RecoverArgs) -> Self {
         Self {
             method: args.method(),
+            fallback: None,
             window: args.window,
             trust: args.trust,
         }
@@ -67,6 +70,7 @@ pub struct CapturePreparation<'a, S> {
 
 /// The photographs, and the recovery that is prepared from them.
 pub struct Attempt<D> {
+    pub method: Method,
     pub sample: CaptureSample<D>,
     pub prepared: Result<PreparedExport, RecoverError>,
     /// Why it may be bad.
@@ -125,6 +129,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
             sample,
             prepared,
             cause,
+            ..
         } = self.examine(sample, &mut findings)?;
         let prepared = match (prepared, &cause) {
             (Ok(prepared), _) => prepared,
@@ -167,7 +172,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         findings.add(messages::eight_bits(folder, shots, read));
         let saturation = messages::saturation(folder, shots, read, &sample.measurements);
         findings.add(saturation);
-        let attempt = self.attempt(sample);
+        let attempt = self.first_attempt(sample);
         let attempt = self.with_capture_fault(attempt, findings)?;
         let attempt = self.with_response(attempt, findings)?;
         let attempt = self.with_flood_shortfall(attempt, findings)?;
@@ -255,7 +260,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         let (moved, shots) = partition(&sample.shots, &still);
         findings.moved_shots = moved;
         let sample = self.source.read_shots(attempt.sample, shots, manifest)?;
-        Ok(self.attempt(sample))
+        Ok(self.attempt(attempt.method, sample))
     }
 
     /// Looks for responses of display and camera that explain the photographs better than those declared. Responses are
@@ -275,13 +280,14 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         let original = declared.sample.folder.manifest().clone();
         let declared_snr = declared.snr();
         let Attempt {
+            method,
             mut sample,
             prepared,
             mut cause,
         } = declared;
         let mut best: Option<(Manifest, Decibels, PreparedExport)> = None;
         for _ in 0..MAX_TRIALS {
-            let trial = self.attempt(self.source.read_by(sample, manifest.clone())?);
+            let trial = self.attempt(method, self.source.read_by(sample, manifest.clone())?);
             let least = match (&best, declared_snr) {
                 (Some((_, snr, _)), _) => snr.0,
                 (None, Some(snr)) => snr.0 + MIN_SNR_RISE.0,
@@ -318,11 +324,13 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         }
         match best.filter(|_| is_used) {
             Some((estimated, _, prepared)) => Ok(Attempt {
+                method,
                 sample: self.source.read_by(sample, estimated)?,
                 prepared: Ok(prepared),
                 cause: None,
             }),
             None => Ok(Attempt {
+                method,
                 sample: self.source.read_by(sample, original)?,
                 prepared,
                 cause,
@@ -393,18 +401,32 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         let finding = field.finding(&self.manifest_path(), &reason);
         findings.add_estimate(field, finding);
         match is_used {
-            true => Ok(self.attempt(self.source.read_by(attempt.sample, amended)?)),
+            true => {
+                let sample = self.source.read_by(attempt.sample, amended)?;
+                Ok(self.attempt(attempt.method, sample))
+            }
             false => Ok(attempt),
         }
     }
 
+    /// As declared, by the method or its fallback.
+    fn first_attempt(&self, sample: CaptureSample<S::Dark>) -> Attempt<S::Dark> {
+        let attempt = self.attempt(self.settings.method, sample);
+        let is_implausible = attempt.snr().is_some_and(|snr| snr < MIN_PLAUSIBLE_SNR);
+        match self.settings.fallback.filter(|_| is_implausible) {
+            Some(method) => self.attempt(method, attempt.sample),
+            None => attempt,
+        }
+    }
+
     /// Chooses the window, and learns or chooses what the method needs.
-    fn attempt(&self, sample: CaptureSample<S::Dark>) -> Attempt<S::Dark> {
+    fn attempt(&self, method: Method, sample: CaptureSample<S::Dark>) -> Attempt<S::Dark> {
         let _spinner = progress::spinner("learning");
-        let PreparationSettings { method, window, .. } = self.settings;
         let cores = self.source.cores();
-        let preparation = export::prepare(&sample.measurements, method, window, cores);
+        let preparation =
+            export::prepare(&sample.measurements, method, self.settings.window, cores);
         Attempt {
+            method,
             prepared: pollster::block_on(preparation),
             sample,
             cause: None,

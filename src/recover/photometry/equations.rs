@@ -66,6 +66,10 @@ pub(super) async fn fit(
     squares: &[TileRect],
 ) -> Result<Option<CorrectionStep>, Cancelled> {
     let (executor, patterns) = (preparation.executor, input.used.len());
+    let input = ResamplingInput {
+        is_exact: false,
+        ..input
+    };
     let pixels = input.measurements.rows.count() * input.measurements.camera.width as usize;
     let is_small = pixels <= squares.len() * MAX_PIXELS_PER_SQUARE;
     let picture = is_small
@@ -118,11 +122,11 @@ pub(super) fn for_largest_window(
 /// Gives the largest window of a square with its scaled pixels, from corrected photographs; once for each plane.
 pub(super) fn for_scaled_pixels(
     input: ResamplingInput<'_>,
+    resampled: Option<&ResampledPhotographs<'_>>,
     square: TileRect,
     mut visit: impl FnMut(LightElement, &WindowCovariance, &[ScaledPixel]),
 ) {
-    let resampled = ResampledPhotographs::of_region(input, square);
-    let measurements = input.calibrated(resampled.as_ref());
+    let measurements = input.calibrated(resampled);
     for_largest_window(input.geometry, square, |origin, pixels| {
         for (plane, channels) in measurements.planes() {
             let model = WindowModel::new(

@@ -7,7 +7,7 @@
 //! both axes alike; flicker does along one.
 
 use super::equations::for_scaled_pixels;
-use super::resampling::ResamplingInput;
+use super::resampling::{ResampledPhotographs, ResamplingInput};
 use crate::job_executor::Executor;
 use crate::linalg;
 use crate::recover::mean_function;
@@ -46,7 +46,9 @@ pub(in crate::recover) fn find(
         return None;
     }
     let squares = mean_function::sample_squares(measurements);
-    let sums = executor.map(squares.len(), |i| square_sums(input, squares[i]));
+    let resampled = ResampledPhotographs::of_picture(input);
+    let sums_of = |i: usize| square_sums(input, resampled.as_ref(), squares[i]);
+    let sums = executor.map(squares.len(), sums_of);
     let across = |square: &TileRect| square.x * bands / measurements.camera.width;
     let down = |square: &TileRect| square.y * bands / measurements.camera.height;
     let [rows, columns] = [
@@ -114,11 +116,15 @@ impl BandErrors {
     }
 }
 
-fn square_sums(input: ResamplingInput<'_>, square: TileRect) -> SquareSums {
+fn square_sums(
+    input: ResamplingInput<'_>,
+    resampled: Option<&ResampledPhotographs<'_>>,
+    square: TileRect,
+) -> SquareSums {
     let count = input.used.len();
     let mut sums = vec![[0.0; 2]; count];
     let mut solved = vec![0.0; count];
-    for_scaled_pixels(input, square, |_, window, pixels| {
+    for_scaled_pixels(input, resampled, square, |_, window, pixels| {
         for pixel in pixels {
             let residual = pixel.residual(&window.model.means);
             linalg::multiply_vector(&window.inverse, &residual, &mut solved);

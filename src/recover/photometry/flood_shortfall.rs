@@ -8,7 +8,7 @@
 
 use super::PhotographCorrection;
 use super::equations::{for_scaled_pixels, predict};
-use super::resampling::ResamplingInput;
+use super::resampling::{ResampledPhotographs, ResamplingInput};
 use super::window_covariance::{ScaledPixel, WindowCovariance, WindowModel};
 use crate::bisect::bisect;
 use crate::capture::CameraResponse;
@@ -50,8 +50,10 @@ pub(in crate::recover) fn find(
         return None;
     }
     let squares = mean_function::sample_squares(measurements);
+    let resampled = ResampledPhotographs::of_picture(input);
     let sums = |response| {
-        let sums_of = |i: usize| square_sums(input, squares[i], flood_white, response);
+        let resampled = resampled.as_ref();
+        let sums_of = |i: usize| square_sums(input, resampled, squares[i], flood_white, response);
         executor.map(squares.len(), sums_of)
     };
     let declared = sums(CameraResponse::Linear);
@@ -105,12 +107,13 @@ fn unexplained_share(sums: Sums) -> f64 {
 /// Sums over a square of photographs that are linearised by `response`.
 fn square_sums(
     input: ResamplingInput<'_>,
+    resampled: Option<&ResampledPhotographs<'_>>,
     square: TileRect,
     flood_white: f64,
     response: CameraResponse,
 ) -> Sums {
     let mut sums = [0.0; 6];
-    for_scaled_pixels(input, square, |origin, window, pixels| {
+    for_scaled_pixels(input, resampled, square, |origin, window, pixels| {
         let flood = WindowModel::of_flood(input.geometry, input.mean_function, origin);
         for scaled in pixels {
             let measured = input

@@ -78,6 +78,7 @@ impl Photometry {
             mean_function: &self.mean_function,
             softness: self.softness,
             used,
+            is_exact: true,
         }
     }
 }

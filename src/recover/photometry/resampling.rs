@@ -13,7 +13,7 @@ use super::{CalibratedMeasurements, PhotographCorrection};
 use crate::capture::Measurements;
 use crate::linalg::{self, vectorise};
 use crate::recover::sampling::{self, PixelsSharingWindow};
-use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry, TileRect};
+use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry, LightElement, TileRect};
 
 /// Largest shift that is undone, in camera pixels.
 pub(super) const MAX_SHIFT: f64 = 0.75;
@@ -27,6 +27,10 @@ pub(in crate::recover) const HALO: u32 = ROUNDS * RADIUS;
 /// round; and its share in the next.
 const SHIFT_VARIANCE: f64 = 0.05;
 const VARIANCE_DECAY: f64 = 0.1;
+/// Distance, in light elements, between the windows whose covariance predicts those around them too, as computing it takes
+/// most of the time; and the least side of these windows, as narrow functions differ too much from those around them.
+const SPACING: i32 = 3;
+const MIN_SHARING_SIDE: u32 = 11;
 /// Variance of what no function explains, relative to brightness.
 const UNEXPLAINED_VARIANCE: f64 = 1e-4;
 /// Most camera pixels that preparing a recovery uses, in blocks of [`SMALL_BLOCK_SIDE`]: 64 training regions with their
@@ -43,10 +47,10 @@ pub(in crate::recover) fn max_prepared_bytes(photographs: usize) -> usize {
 }
 
 /// Upper bound on the memory that resampling takes for a tile of so many photographs with a border of `halo`, in bytes:
-/// photographs as measured, corrected and predicted, and the samples.
+/// photographs as corrected and predicted, and the samples.
 pub(in crate::recover) fn max_tile_bytes(photographs: usize, halo: u32) -> usize {
     let side = (Geometry::DEFAULT_TILE_SIDE + 2 * (halo + HALO)) as usize;
-    side * side * photographs * (3 * size_of::<[f64; CHANNELS]>() + size_of::<[f32; CHANNELS]>())
+    side * side * photographs * (2 * size_of::<[f64; CHANNELS]>() + size_of::<[f32; CHANNELS]>())
 }
 
 /// The measurements, and the estimates that resampling depends on.
@@ -61,6 +65,8 @@ pub(in crate::recover) struct ResamplingInput<'a> {
     pub softness: f64,
     /// The photographs that belong to the capture; others are not resampled.
     pub used: &'a [usize],
+    /// Whether every window has a covariance of its own in the last round. Shifts that are estimated without are as good.
+    pub is_exact: bool,
 }
 
 /// The samples of a region as if taken from one place, block by block when they are first needed.
@@ -167,16 +173,15 @@ impl<'a> ResamplingInput<'a> {
         let measurements = self.calibrated(None);
         let with_margin = |margin: u32| sampling::with_margin(self.measurements, rect, margin);
         let region = with_margin(HALO);
-        let mut measured = Vec::with_capacity(self.used.len());
+        let mut corrected = Vec::with_capacity(self.used.len());
         for &l in self.used {
             let mut photograph = Vec::with_capacity(region.extent.area() * CHANNELS);
             for pixel in region.pixels() {
                 (0..CHANNELS)
                     .for_each(|c| photograph.push(measurements.sample_or_white(l, pixel, c)));
             }
-            measured.push(photograph);
+            corrected.push(photograph);
         }
-        let mut corrected = measured.clone();
         let mut shift_variance = SHIFT_VARIANCE;
         for round in 0..ROUNDS {
             let inner = with_margin((ROUNDS - round) * RADIUS);
@@ -186,9 +191,21 @@ impl<'a> ResamplingInput<'a> {
                 UNEXPLAINED_VARIANCE + shift_variance * (x * x + y * y)
             };
             let variances: Vec<f64> = self.used.iter().map(variance).collect();
+            let is_narrow = self.geometry.window.side() < MIN_SHARING_SIDE;
+            let is_exact = is_narrow || self.is_exact && round + 1 == ROUNDS;
+            let spacing = if is_exact { 1 } else { SPACING };
             let predicted = vectorise(
                 #[cfg_attr(target_arch = "x86_64", inline(always))]
-                || self.predict(&measurements, &corrected, region, inner, &variances),
+                || {
+                    self.predict(
+                        &measurements,
+                        &corrected,
+                        region,
+                        inner,
+                        &variances,
+                        spacing,
+                    )
+                },
             );
             for (i, &l) in self.used.iter().enumerate() {
                 if self.corrections[l].is_shifted() {
@@ -197,8 +214,10 @@ impl<'a> ResamplingInput<'a> {
                     let changes = shift_changes(&predicted[i], inner, target, taps);
                     for (pixel, change) in target.pixels().zip(&changes) {
                         let n = index_in(region, pixel);
-                        (0..CHANNELS)
-                            .for_each(|c| corrected[i][n + c] = measured[i][n + c] - change[c]);
+                        for c in 0..CHANNELS {
+                            let measured = measurements.sample_or_white(l, pixel, c);
+                            corrected[i][n + c] = measured - change[c];
+                        }
                     }
                 }
             }
@@ -227,7 +246,7 @@ impl<'a> ResamplingInput<'a> {
     }
 
     /// Leave-one-out predictions of every photograph in the region `inner`, `[L][pixel, channel]`, from photographs
-    /// `[L][pixel, channel]` of `region`.
+    /// `[L][pixel, channel]` of `region`, with covariances of windows at distances of `spacing`.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     fn predict(
         &self,
@@ -236,9 +255,16 @@ impl<'a> ResamplingInput<'a> {
         region: TileRect,
         inner: TileRect,
         variances: &[f64],
+        spacing: i32,
     ) -> Vec<Vec<f64>> {
         let mut predicted = vec![vec![0.0; inner.extent.area() * CHANNELS]; photographs.len()];
-        for (origin, pixels) in sampling::pixels_by_window(self.geometry, inner) {
+        let mut windows = Vec::new();
+        for (p, pixel) in inner.pixels().enumerate() {
+            let LightElement { v, u } = self.geometry.window_origin(pixel);
+            let [v, u] = [v, u].map(|i| i.div_euclid(spacing) * spacing + spacing / 2);
+            sampling::add_to_group(&mut windows, LightElement { v, u }, (p, pixel));
+        }
+        for (origin, pixels) in windows {
             for (plane, channels) in measurements.planes() {
                 let model = WindowModel::new(
                     measurements,

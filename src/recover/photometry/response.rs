@@ -183,6 +183,7 @@ impl<E: Executor> ResponseSearch<'_, E> {
             mean_function: self.mean_function,
             softness: 0.0,
             used: self.used,
+            is_exact: true,
         };
         let shortfall = flood_shortfall::find(input, self.flood_white, self.executor);
         let slope = shortfall.and_then(|shortfall| shortfall.compression);
