@@ -25,7 +25,7 @@ const MIN_SIGNIFICANCE: f64 = 5.0;
 const SLOPES: [f64; 2] = [1.0, 4.0];
 const HALVINGS: usize = 10;
 /// Largest share of the flood photograph that compression leaves unexplained, relative to what dimming leaves.
-const MAX_UNEXPLAINED_RATIO: f64 = 0.5;
+const MAX_UNEXPLAINED_RATIO: f64 = 0.8;
 /// Sums of products of prediction p, stray light u and measurement y: pp, pu, uu, py, uy, yy.
 type Sums = [f64; 6];
 

@@ -47,10 +47,10 @@ pub(in crate::recover) fn max_prepared_bytes(photographs: usize) -> usize {
 }
 
 /// Upper bound on the memory that resampling takes for a tile of so many photographs with a border of `halo`, in bytes:
-/// photographs as corrected and predicted, and the samples.
+/// photographs as corrected, as predicted in both rounds (an allocator may keep the first), and the samples.
 pub(in crate::recover) fn max_tile_bytes(photographs: usize, halo: u32) -> usize {
     let side = (Geometry::DEFAULT_TILE_SIDE + 2 * (halo + HALO)) as usize;
-    side * side * photographs * (2 * size_of::<[f64; CHANNELS]>() + size_of::<[f32; CHANNELS]>())
+    side * side * photographs * (3 * size_of::<[f64; CHANNELS]>() + size_of::<[f32; CHANNELS]>())
 }
 
 /// The measurements, and the estimates that resampling depends on.

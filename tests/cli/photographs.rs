@@ -1,8 +1,4 @@
 //! Recovery from photographs with faults: what `ltm-export recover` corrects, leaves out and says.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a panic fails the test
-
-mod common;
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -13,7 +9,7 @@ use image::{ImageBuffer, Rgb};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::copy_folder;
+use crate::common::copy_folder;
 
 type Photograph = ImageBuffer<Rgb<u16>, Vec<u16>>;
 

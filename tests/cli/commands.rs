@@ -1,9 +1,5 @@
 //! The commands of `ltm-export` end to end, on the capture `glass-s`: figures, pictures, and messages for
 //! wrong inputs.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a panic fails the test
-
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +10,7 @@ use assert_cmd::Command;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::copy_folder;
+use crate::common::copy_folder;
 
 fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/glass-s")

@@ -1,8 +1,4 @@
 //! Recovery with little memory, and recovery that is interrupted and resumed.
-#![cfg(unix)]
-#![allow(clippy::unwrap_used)] // a failed test should panic
-
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,7 +9,7 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::copy_folder;
+use crate::common::copy_folder;
 
 fn command(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));

@@ -1,6 +1,4 @@
 //! `ltm-export study` on a capture with known transport.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a failed step fails the test
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,5 @@
 //! Raw files, floating-point numbers and 32-bit integers become the measurements of a capture. Raw files need LibRaw's
 //! `dcraw_emu`.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a panic fails the test
-
-mod common;
-mod session;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,8 +8,8 @@ use std::process::{Command, Output};
 use half::f16;
 use image::{ImageBuffer, Rgb};
 
-use common::tiff_writer::{RgbSamples, bayer_dng, rgb_tiff};
-use session::{Session, stderr_text};
+use crate::common::tiff_writer::{RgbSamples, bayer_dng, rgb_tiff};
+use crate::session::{Session, stderr_text};
 
 type Photo = ImageBuffer<Rgb<u16>, Vec<u16>>;
 

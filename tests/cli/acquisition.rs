@@ -1,17 +1,12 @@
 //! From a display to a capture: `ltm-export patterns`, photographs by a simulated camera, and `ltm-export assemble`.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a panic fails the test
-
-mod common;
-mod session;
 
 use std::fs;
 
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::copy_folder;
-use session::{Session, run, stderr_text, succeed};
+use crate::common::copy_folder;
+use crate::session::{Session, run, stderr_text, succeed};
 
 #[test]
 fn a_session_becomes_a_capture_that_is_recovered() {

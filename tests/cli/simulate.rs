@@ -1,6 +1,4 @@
 //! Simulated captures: reproducibility, agreement with the known transport, and properties of the scenes.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a failed step fails the test
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,8 +1,4 @@
 //! Sessions of other programs, and correspondences that bend: `ltm-export import`, `calibrate` and `recover`.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a panic fails the test
-
-mod session;
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +7,7 @@ use std::process::Output;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use session::{Session, run, stderr_text, succeed};
+use crate::session::{Session, run, stderr_text, succeed};
 
 fn fail(arguments: &[&str]) -> String {
     let output = run(arguments);

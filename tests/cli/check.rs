@@ -1,8 +1,4 @@
 //! `ltm-export check`: all that is wrong with a capture folder, at once.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a panic fails the test
-
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,7 +9,7 @@ use image::{ImageBuffer, Rgb};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use common::copy_folder;
+use crate::common::copy_folder;
 
 type Photograph = ImageBuffer<Rgb<u16>, Vec<u16>>;
 
@@ -549,7 +545,7 @@ const ENLARGEMENT: u32 = 20;
 /// Time and memory with 80 shots of 24 megapixels, and 30 other photographs. `CHECK_CAPTURE` names a folder that keeps the
 /// capture.
 #[test]
-#[ignore = "takes minutes and 12 GB; run it by: cargo test --release --test check -- --ignored --nocapture"]
+#[ignore = "takes minutes and 12 GB; run it by: cargo test --release --test cli check:: -- --ignored --nocapture"]
 fn photographs_of_24_megapixels_take_a_minute_and_a_gigabyte() {
     let folder = TempDir::new().unwrap();
     let kept = std::env::var_os("CHECK_CAPTURE").map(PathBuf::from);

@@ -1,14 +1,10 @@
 //! `ltm-export report`: a page that says what a file may be used for, and where it comes from.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used)] // a panic fails the test
-
-mod session;
 
 use std::fs;
 
 use serde_json::Value;
 
-use session::{Session, run, stderr_text, succeed};
+use crate::session::{Session, run, stderr_text, succeed};
 
 /// A session that is recovered from 40 of its 48 patterns.
 fn recovered() -> Session {

@@ -1,6 +1,4 @@
 //! A session with a simulated object: what a display shows, and its photographs.
-#![allow(dead_code)] // each test program uses some of it
-#![allow(clippy::unwrap_used)] // a panic fails the test
 
 use std::fs;
 use std::path::PathBuf;
