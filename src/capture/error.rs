@@ -73,7 +73,10 @@ pub enum CaptureErrorKind {
     },
     /// Neither gamma nor the monitor's response is given.
     #[error("\"light.gamma\" is missing, and so is \"light.response\"")]
-    MissingResponse,
+    MissingResponse {
+        /// Paths of unknown fields: one may be either of these, misspelt.
+        unknown: Vec<String>,
+    },
     /// Both gamma and the monitor's response are given.
     #[error("\"light.response\" and \"light.gamma\" are both given, but exclude each other")]
     ConflictingResponse,

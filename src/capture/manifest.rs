@@ -165,8 +165,8 @@ impl ManifestLight {
         }
     }
 
-    /// Exactly one of gamma and response must be given, and be usable.
-    fn problems(&self) -> Vec<CaptureErrorKind> {
+    /// Exactly one of gamma and response must be given, and be usable. `unknown` are paths of the manifest's unknown fields.
+    fn problems(&self, unknown: &[String]) -> Vec<CaptureErrorKind> {
         let dimming = self.dimming.unwrap_or(0.0);
         let dimming = check_range(
             (0.0..=MAX_DIMMING).contains(&dimming),
@@ -181,7 +181,9 @@ impl ManifestLight {
             }
             (Some(_), None) => Ok(()),
             (None, Some(gamma)) => check_exponent("light.gamma", gamma),
-            (None, None) => Err(CaptureErrorKind::MissingResponse),
+            (None, None) => Err(CaptureErrorKind::MissingResponse {
+                unknown: unknown.to_vec(),
+            }),
         };
         [dimming, response]
             .into_iter()
@@ -353,7 +355,7 @@ impl Manifest {
                 check_exponent("camera.response.compression", slope)
             }
         });
-        for problem in light.problems() {
+        for problem in light.problems(&self.unknown) {
             check(Err(problem));
         }
         if self.shots.is_empty() {

@@ -25,15 +25,21 @@ pub fn remedy_of_capture(error: &CaptureError) -> Option<String> {
 
 /// Names the field that a missing one was probably misspelt as.
 fn misspelt_field(error: &CaptureError) -> Option<String> {
-    let CaptureErrorKind::MissingField { field, unknown } = &error.problem else {
-        return None;
+    let (fields, unknown) = match &error.problem {
+        CaptureErrorKind::MissingField { field, unknown } => (vec![field.as_str()], unknown),
+        CaptureErrorKind::MissingResponse { unknown } => {
+            (vec!["light.gamma", "light.response"], unknown)
+        }
+        _ => return None,
     };
-    let field = field.replace('[', ".").replace(']', "");
-    let (object, name) = split_path(&field);
-    let resembles =
-        |path: &&String| split_path(path).0 == object && similar_fields(path).contains(&name);
-    let misspelt = unknown.iter().find(resembles)?;
-    Some(format!("correct the name of \"{misspelt}\" to \"{name}\""))
+    fields.into_iter().find_map(|field| {
+        let field = field.replace('[', ".").replace(']', "");
+        let (object, name) = split_path(&field);
+        let resembles =
+            |path: &&String| split_path(path).0 == object && similar_fields(path).contains(&name);
+        let misspelt = unknown.iter().find(resembles)?;
+        Some(format!("correct the name of \"{misspelt}\" to \"{name}\""))
+    })
 }
 
 fn remedy(error: &(dyn Error + 'static)) -> Option<String> {

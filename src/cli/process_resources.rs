@@ -22,6 +22,13 @@ impl Executor for AllCoresExecutor {
 
 /// Peak resident memory of this process in bytes; `None` where the system does not report it.
 pub fn peak_rss_bytes() -> Option<u64> {
+    // Linux's `getrusage` counts what the process that started this one had in memory.
+    #[cfg(target_os = "linux")]
+    if let Some(peak) =
+        peak_of_status(&std::fs::read_to_string("/proc/self/status").unwrap_or_default())
+    {
+        return Some(peak);
+    }
     #[cfg(unix)]
     {
         use nix::sys::resource::{UsageWho, getrusage};
@@ -32,6 +39,16 @@ pub fn peak_rss_bytes() -> Option<u64> {
     }
     #[cfg(not(unix))]
     None
+}
+
+/// The peak resident memory of `/proc/PID/status` in bytes.
+#[cfg(target_os = "linux")]
+fn peak_of_status(status: &str) -> Option<u64> {
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
+    Some(kibibytes * 1024)
 }
 
 /// Exit status after an interruption, as shells report Ctrl-C.

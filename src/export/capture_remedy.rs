@@ -4,11 +4,11 @@ use crate::capture::{CaptureError, CaptureErrorKind};
 
 /// What removes the problem of a capture, in terms of its folder; `None` where the error says it.
 pub fn capture_remedy(error: &CaptureError) -> Option<&'static str> {
-    Some(match error.problem {
+    Some(match &error.problem {
         CaptureErrorKind::Missing if error.field.is_some() => "add it or correct its name",
         CaptureErrorKind::NotACapture(_) => "give the folder that holds capture.json",
         CaptureErrorKind::UnknownVersion(_) => "get a newer program",
-        CaptureErrorKind::MissingResponse => {
+        CaptureErrorKind::MissingResponse { .. } => {
             "give the gamma of the monitor or projector, usually about 2.2, or its measured response"
         }
         CaptureErrorKind::ConflictingResponse => "remove one of them",

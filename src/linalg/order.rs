@@ -51,6 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[cfg_attr(target_arch = "wasm32", wasm_bindgen_test::wasm_bindgen_test)]
     fn equal_keys_keep_their_order() {
         let keys = [3.0, -1.0, 3.0, f64::INFINITY, -1.0, -2.5];
         assert_eq!(ascending_order(keys), [5, 1, 4, 0, 2, 3]);

@@ -602,6 +602,19 @@ fn a_bad_manifest_is_refused_by_field() {
         ],
     );
     assert_refused(
+        |c| {
+            edit_manifest(c, |m| {
+                let light = m["light"].as_object_mut().unwrap();
+                let gamma = light.remove("gamma").unwrap();
+                light.insert("gama".to_owned(), gamma);
+            })
+        },
+        &[
+            "\"light.gamma\" is missing, and so is \"light.response\"",
+            "correct the name of \"light.gama\" to \"gamma\"",
+        ],
+    );
+    assert_refused(
         |c| edit_manifest(c, |m| m["correspondence"]["affine"][0][2] = 1e6.into()),
         &["correspondence", "no camera pixel"],
     );

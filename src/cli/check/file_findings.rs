@@ -146,7 +146,7 @@ fn code(problem: &CaptureErrorKind) -> &'static str {
         Kind::FieldType(..)
         | Kind::MissingField { .. }
         | Kind::OutOfRange { .. }
-        | Kind::MissingResponse
+        | Kind::MissingResponse { .. }
         | Kind::ConflictingResponse
         | Kind::InvalidResponse
         | Kind::NoShots

@@ -285,7 +285,7 @@ pub fn photographs(
                 own.pattern
             ),
             PhotographFault::OtherObject => {
-                "it shows another object, or this one from half a pixel away or more. Photograph again".to_owned()
+                "it shows another object, or this one from another place. Photograph again".to_owned()
             }
             PhotographFault::Moved { shift: [x, y] } => format!(
                 "the camera or the object had moved, by about {x:.1} pixels to the right and {y:.1} down. Fasten both, \

@@ -409,7 +409,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         }
     }
 
-    /// As declared, by the method or its fallback.
+    /// Prepares the recovery as declared: by the fallback where the method predicts too badly.
     fn first_attempt(&self, sample: CaptureSample<S::Dark>) -> Attempt<S::Dark> {
         let attempt = self.attempt(self.settings.method, sample);
         let is_implausible = attempt.snr().is_some_and(|snr| snr < MIN_PLAUSIBLE_SNR);

@@ -27,9 +27,6 @@ const GAUGE_WEIGHT: f64 = 1e3;
 const MIN_DEVIATION: f64 = 0.1;
 /// Distance, in camera pixels, of the samples whose difference is a gradient.
 const GRADIENT_MARGIN: u32 = 1;
-/// Pixels of the picture for each square up to which the picture is resampled, rather than each square with its own
-/// border.
-const MAX_PIXELS_PER_SQUARE: usize = 160;
 /// Ridge relative to the equations' diagonal: a dark photograph has no equations of its own.
 const RIDGE: f64 = 1e-8;
 
@@ -70,11 +67,7 @@ pub(super) async fn fit(
         is_exact: false,
         ..input
     };
-    let pixels = input.measurements.rows.count() * input.measurements.camera.width as usize;
-    let is_small = pixels <= squares.len() * MAX_PIXELS_PER_SQUARE;
-    let picture = is_small
-        .then(|| ResampledPhotographs::of_picture(input))
-        .flatten();
+    let picture = ResampledPhotographs::of_small_picture(input, squares.len());
     let sum_part = |part: usize| {
         let mut sums = CalibrationSums::zeros(patterns);
         for square in &squares[share_of_jobs(squares.len(), part, PARTS)] {
@@ -119,14 +112,19 @@ pub(super) fn for_largest_window(
     }
 }
 
-/// Gives the largest window of a square with its scaled pixels, from corrected photographs; once for each plane.
+/// Gives the largest window of a square with its scaled pixels, from corrected photographs; once for each plane. `picture`
+/// holds the resampled photographs, unless the square has to be resampled alone.
 pub(super) fn for_scaled_pixels(
     input: ResamplingInput<'_>,
-    resampled: Option<&ResampledPhotographs<'_>>,
+    picture: Option<&ResampledPhotographs<'_>>,
     square: TileRect,
     mut visit: impl FnMut(LightElement, &WindowCovariance, &[ScaledPixel]),
 ) {
-    let measurements = input.calibrated(resampled);
+    let region = match picture {
+        Some(_) => None,
+        None => ResampledPhotographs::of_region(input, square),
+    };
+    let measurements = input.calibrated(picture.or(region.as_ref()));
     for_largest_window(input.geometry, square, |origin, pixels| {
         for (plane, channels) in measurements.planes() {
             let model = WindowModel::new(

@@ -134,14 +134,8 @@ pub(in crate::recover) async fn estimate(
             if outliers.len() + found.len() > max_outliers {
                 return Ok(Photometry::default());
             }
-            for l in found.into_iter().map(|i| used[i]) {
-                // If the camera moved once, another photograph from away may be too different to be corrected.
-                match !moved.is_empty() && distance(&photometry, l) > MIN_SHIFT {
-                    true => moved.push((l, moved_fault(&photometry, l))),
-                    false => outliers.push(l),
-                }
-            }
-            used.retain(|l| !outliers.contains(l) && moved.iter().all(|fault| fault.0 != *l));
+            outliers.extend(found.iter().map(|&i| used[i]));
+            used.retain(|l| !outliers.contains(l));
             steps = 0;
         } else if shift_steps > 0 && readmitted.is_empty() && !outliers.is_empty() {
             // A photograph from another place may have seemed to be of another object.
@@ -151,16 +145,16 @@ pub(in crate::recover) async fn estimate(
                 .collect();
             readmission_steps = MAX_READMISSION_STEPS;
         } else {
-            let left_out = moved_photographs(&used, &photometry);
+            let left_out = moved_photographs(&used, &photometry.corrections);
             let all_moved = moved.len() + left_out.len();
             if left_out.is_empty() || all_moved as f64 > MAX_MOVED_SHARE * count as f64 {
                 break step;
             }
             used.retain(|l| !left_out.contains(l));
-            let faults = left_out
-                .into_iter()
-                .map(|l| (l, moved_fault(&photometry, l)));
-            moved.extend(faults);
+            let fault = |l: usize| PhotographFault::Moved {
+                shift: photometry.corrections[l].shift,
+            };
+            moved.extend(left_out.into_iter().map(|l| (l, fault(l))));
             (steps, shift_steps) = (0, 0);
         }
         if used.len() < MIN_USED {
@@ -323,24 +317,16 @@ fn are_significant(shifts: &[f64], errors: &[f64]) -> bool {
         || shifts.iter().zip(errors).any(is_large)
 }
 
-/// Distance in camera pixels between the places that photograph `l` and the others were taken from.
-fn distance(photometry: &Photometry, l: usize) -> f64 {
-    let [x, y] = photometry.corrections[l].shift;
-    (x * x + y * y).sqrt()
-}
-
-fn moved_fault(photometry: &Photometry, l: usize) -> PhotographFault {
-    PhotographFault::Moved {
-        shift: photometry.corrections[l].shift,
-    }
-}
-
 /// The photographs taken from another place than the others of `used`, which were taken from one: the camera moved once.
-fn moved_photographs(used: &[usize], photometry: &Photometry) -> Vec<usize> {
+fn moved_photographs(used: &[usize], corrections: &[PhotographCorrection]) -> Vec<usize> {
+    let distance = |l: usize| {
+        let [x, y] = corrections[l].shift;
+        (x * x + y * y).sqrt()
+    };
     let mut moved = Vec::new();
     let mut distances = Vec::new();
     for &l in used {
-        match distance(photometry, l) {
+        match distance(l) {
             far if far > MIN_MOVE => moved.push(l),
             near => distances.push(near),
         }

@@ -46,8 +46,8 @@ pub(in crate::recover) fn find(
         return None;
     }
     let squares = mean_function::sample_squares(measurements);
-    let resampled = ResampledPhotographs::of_picture(input);
-    let sums_of = |i: usize| square_sums(input, resampled.as_ref(), squares[i]);
+    let picture = ResampledPhotographs::of_small_picture(input, squares.len());
+    let sums_of = |i: usize| square_sums(input, picture.as_ref(), squares[i]);
     let sums = executor.map(squares.len(), sums_of);
     let across = |square: &TileRect| square.x * bands / measurements.camera.width;
     let down = |square: &TileRect| square.y * bands / measurements.camera.height;
@@ -118,13 +118,13 @@ impl BandErrors {
 
 fn square_sums(
     input: ResamplingInput<'_>,
-    resampled: Option<&ResampledPhotographs<'_>>,
+    picture: Option<&ResampledPhotographs<'_>>,
     square: TileRect,
 ) -> SquareSums {
     let count = input.used.len();
     let mut sums = vec![[0.0; 2]; count];
     let mut solved = vec![0.0; count];
-    for_scaled_pixels(input, resampled, square, |_, window, pixels| {
+    for_scaled_pixels(input, picture, square, |_, window, pixels| {
         for pixel in pixels {
             let residual = pixel.residual(&window.model.means);
             linalg::multiply_vector(&window.inverse, &residual, &mut solved);

@@ -4,7 +4,7 @@
 //! Many displays limit their power: the more elements are lit, the less each emits; then all pixels are darker by one
 //! ratio, which follows by regression over sampled pixels. Or the photographs have compressed highlights; then bright
 //! pixels fall short by a larger share than dim ones. Bisection finds the compression with which the ratio is 1. It is the
-//! cause if it leaves far less of the flood photograph unexplained.
+//! cause if it leaves less of the flood photograph unexplained.
 
 use super::PhotographCorrection;
 use super::equations::{for_scaled_pixels, predict};
@@ -24,8 +24,6 @@ const MIN_SIGNIFICANCE: f64 = 5.0;
 /// Range of the ratio of slopes of compressed highlights, and the halvings that find it.
 const SLOPES: [f64; 2] = [1.0, 4.0];
 const HALVINGS: usize = 10;
-/// Largest share of the flood photograph that compression leaves unexplained, relative to what dimming leaves.
-const MAX_UNEXPLAINED_RATIO: f64 = 0.8;
 /// Sums of products of prediction p, stray light u and measurement y: pp, pu, uu, py, uy, yy.
 type Sums = [f64; 6];
 
@@ -50,10 +48,10 @@ pub(in crate::recover) fn find(
         return None;
     }
     let squares = mean_function::sample_squares(measurements);
-    let resampled = ResampledPhotographs::of_picture(input);
+    let picture = ResampledPhotographs::of_small_picture(input, squares.len());
     let sums = |response| {
-        let resampled = resampled.as_ref();
-        let sums_of = |i: usize| square_sums(input, resampled, squares[i], flood_white, response);
+        let picture = picture.as_ref();
+        let sums_of = |i: usize| square_sums(input, picture, squares[i], flood_white, response);
         executor.map(squares.len(), sums_of)
     };
     let declared = sums(CameraResponse::Linear);
@@ -72,8 +70,7 @@ pub(in crate::recover) fn find(
     // The search has no errors.
     let [_, slope] = bisect(SLOPES, HALVINGS, is_too_dark).unwrap_or(SLOPES);
     let unexplained = unexplained_share(compressed(slope));
-    let is_cause = slope < SLOPES[1]
-        && unexplained < MAX_UNEXPLAINED_RATIO * unexplained_share(total(&declared, None));
+    let is_cause = slope < SLOPES[1] && unexplained < unexplained_share(total(&declared, None));
     Some(FloodShortfall {
         dimming,
         compression: is_cause.then_some(slope),
@@ -107,13 +104,13 @@ fn unexplained_share(sums: Sums) -> f64 {
 /// Sums over a square of photographs that are linearised by `response`.
 fn square_sums(
     input: ResamplingInput<'_>,
-    resampled: Option<&ResampledPhotographs<'_>>,
+    picture: Option<&ResampledPhotographs<'_>>,
     square: TileRect,
     flood_white: f64,
     response: CameraResponse,
 ) -> Sums {
     let mut sums = [0.0; 6];
-    for_scaled_pixels(input, resampled, square, |origin, window, pixels| {
+    for_scaled_pixels(input, picture, square, |origin, window, pixels| {
         let flood = WindowModel::of_flood(input.geometry, input.mean_function, origin);
         for scaled in pixels {
             let measured = input

@@ -27,10 +27,13 @@ pub(in crate::recover) const HALO: u32 = ROUNDS * RADIUS;
 /// round; and its share in the next.
 const SHIFT_VARIANCE: f64 = 0.05;
 const VARIANCE_DECAY: f64 = 0.1;
-/// Distance, in light elements, between the windows whose covariance predicts those around them too, as computing it takes
-/// most of the time; and the least side of these windows, as narrow functions differ too much from those around them.
+/// Distance, in light elements, between the windows whose covariance predicts those around them too: computing it takes
+/// most of the time.
 const SPACING: i32 = 3;
+/// Least side of such windows. A smaller one would lose too much of a function that is one element further.
 const MIN_SHARING_SIDE: u32 = 11;
+/// Pixels of the picture for each of its sampled squares up to which it is resampled as a whole.
+const MAX_PIXELS_PER_SQUARE: usize = 160;
 /// Variance of what no function explains, relative to brightness.
 const UNEXPLAINED_VARIANCE: f64 = 1e-4;
 /// Most camera pixels that preparing a recovery uses, in blocks of [`SMALL_BLOCK_SIDE`]: 64 training regions with their
@@ -65,7 +68,7 @@ pub(in crate::recover) struct ResamplingInput<'a> {
     pub softness: f64,
     /// The photographs that belong to the capture; others are not resampled.
     pub used: &'a [usize],
-    /// Whether every window has a covariance of its own in the last round. Shifts that are estimated without are as good.
+    /// Whether every window has a covariance of its own in the last round. Estimates of shifts do not need it.
     pub is_exact: bool,
 }
 
@@ -97,6 +100,13 @@ impl<'a> ResampledPhotographs<'a> {
             false => SMALL_BLOCK_SIDE,
         };
         Self::new(input, rect, Extent::new(side, side))
+    }
+
+    /// The whole picture, if resampling it takes less time than `squares` small squares of it, each with its own border.
+    pub fn of_small_picture(input: ResamplingInput<'a>, squares: usize) -> Option<Self> {
+        let pixels = input.measurements.rows.count() * input.measurements.camera.width as usize;
+        let is_small = pixels <= squares * MAX_PIXELS_PER_SQUARE;
+        is_small.then(|| Self::of_picture(input)).flatten()
     }
 
     fn new(input: ResamplingInput<'a>, rect: TileRect, block: Extent) -> Option<Self> {

@@ -17,7 +17,7 @@ impl From<CaptureError> for CodedError {
             Kind::PatternType(_) => "capture-pattern",
             Kind::NotACapture(_)
             | Kind::UnknownVersion(_)
-            | Kind::MissingResponse
+            | Kind::MissingResponse { .. }
             | Kind::ConflictingResponse
             | Kind::NoShots
             | Kind::MissingGrayCode { .. }

@@ -42,7 +42,13 @@ export class Structure {
       this.#worker = worker;
       this.#analyse(result, worker).catch((error) => {
         // A photograph that is no longer shown may have been freed meanwhile.
-        if (worker === this.#worker) throw error;
+        if (worker !== this.#worker) return;
+        // The page does without: photograph and light work.
+        console.error('The structure of the light transport matrix was not analysed:', error);
+        worker.terminate();
+        this.#worker = undefined;
+        this.#shown = undefined;
+        this.#draw();
       });
     }, DELAY_MS);
   }

@@ -59,7 +59,7 @@ test('each photograph that is left out has a warning of its own, which names its
       ],
       [
         'photograph-object',
-        'shots[21] is left out: it shows another object, or this one from half a pixel away or more.',
+        'shots[21] is left out: it shows another object, or this one from another place.',
       ],
       ...[22, 23].map((shot) => [
         'photograph-distorted',

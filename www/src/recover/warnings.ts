@@ -48,7 +48,7 @@ function faultMessages([shot, other, percent]: string[]): Record<PhotographFault
     'photograph-pattern': `${shows} the pattern of shots[${other}].`,
     'photograph-blend': `${shows} a blend of its pattern and ${percent} % of the pattern of shots[${other}]. Was it taken while the screen changed?`,
     'photograph-unknown-pattern': `${shows} neither its pattern nor any other pattern of this capture.`,
-    'photograph-object': `${shows} another object, or this one from half a pixel away or more.`,
+    'photograph-object': `${shows} another object, or this one from another place.`,
     'photograph-moved':
       (other === '1'
         ? `shots[${shot}] is left out`
