@@ -78,10 +78,17 @@ pub(super) fn pixels_by_window(
     geometry: &Geometry,
     rect: TileRect,
 ) -> Vec<Group<LightElement, (usize, CameraPixel)>> {
+    pixels_by_origin(rect, |pixel| geometry.window_origin(pixel))
+}
+
+/// The pixels of a region, grouped by the `origin` of a window near them.
+pub(super) fn pixels_by_origin(
+    rect: TileRect,
+    origin: impl Fn(CameraPixel) -> LightElement,
+) -> Vec<Group<LightElement, (usize, CameraPixel)>> {
     let mut windows = Vec::new();
     for (p, pixel) in rect.pixels().enumerate() {
-        let origin = geometry.window_origin(pixel);
-        add_to_group(&mut windows, origin, (p, pixel));
+        add_to_group(&mut windows, origin(pixel), (p, pixel));
     }
     windows
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 use std::sync::LazyLock;
 
 use image::{ImageBuffer, Rgb};
@@ -10,23 +10,13 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use crate::common::copy_folder;
+use crate::session::{run, succeed};
 
 type Photograph = ImageBuffer<Rgb<u16>, Vec<u16>>;
 
 /// Levels of simulated captures.
 const BLACK: f64 = 512.0;
 const WHITE: f64 = 60_000.0;
-
-fn run(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
-    command.args(arguments).output().unwrap()
-}
-
-fn succeed(arguments: &[&str]) {
-    let output = run(arguments);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-}
 
 fn text(path: &Path) -> String {
     path.to_str().unwrap().to_owned()

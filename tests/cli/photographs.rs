@@ -10,6 +10,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::common::copy_folder;
+use crate::session::succeed;
 
 type Photograph = ImageBuffer<Rgb<u16>, Vec<u16>>;
 
@@ -345,39 +346,12 @@ fn a_camera_that_trembles_is_followed_and_warned_of() {
 /// With 11 light elements and more, windows share covariances.
 #[test]
 fn the_transport_of_a_trembling_camera_is_recovered_accurately() {
-    let folder = TempDir::new().unwrap();
-    let [original, faulty, file] =
-        ["original", "faulty", "file.ltm"].map(|name| folder.path().join(name));
-    let [original, faulty, file] = [&original, &faulty, &file].map(|path| path.to_str().unwrap());
-    let run = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
-        let output = command.args(arguments).output().unwrap();
-        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{arguments:?}: {errors}");
-        output.stdout
-    };
-    let size = ["--camera", "48x48", "--light", "24x24", "--patterns", "70"];
-    run(&[&["simulate", "cookies", "-o", original], &size[..]].concat());
-    run(&[
-        "photograph",
-        original,
-        "-o",
-        faulty,
-        "--fault",
-        "tremble=0.2",
-    ]);
-    run(&[
-        "recover",
-        faulty,
-        "-o",
-        file,
-        "--lossless",
-        "--window",
-        "11",
-    ]);
-    let evaluated: Value =
-        serde_json::from_slice(&run(&["evaluate", file, faulty, "--json"])).unwrap();
-    // 37.6 dB if the camera does not tremble, and 12 dB if shifts are not corrected.
+    let (_folder, [capture, file]) = &faulty_capture("cookies", "70", "tremble=0.2");
+    let recover = ["recover", capture, "-o", file, "--lossless"];
+    succeed(&[&recover[..], &["--window", "11"]].concat());
+    let evaluated = succeed(&["evaluate", file, capture, "--json"]).stdout;
+    let evaluated: Value = serde_json::from_slice(&evaluated).unwrap();
+    // 37.6 dB if the camera does not tremble.
     let snr = number(&evaluated["snr_db"]);
     assert!(snr > 27.0, "{snr}");
 }
@@ -511,26 +485,24 @@ fn a_display_that_dims_bright_pictures_is_told() {
     assert_eq!(declared["warnings"], Value::Array(Vec::new()), "{errors}");
 }
 
+/// Simulates a capture, and photographs it again with a fault: the folder to keep, and the paths of the capture and of a file.
+fn faulty_capture(scene: &str, patterns: &str, fault: &str) -> (TempDir, [String; 2]) {
+    let folder = TempDir::new().unwrap();
+    let [original, faulty, file] = ["original", "faulty", "file.ltm"]
+        .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let size = ["--camera", "48x48", "--light", "24x24"];
+    let simulate = ["simulate", scene, "-o", &original, "--patterns", patterns];
+    succeed(&[&simulate[..], &size].concat());
+    succeed(&["photograph", &original, "-o", &faulty, "--fault", fault]);
+    (folder, [faulty, file])
+}
+
 /// Simulates a capture, photographs it again with a fault, and recovers it: the report.
 fn report_of_fault(scene: &str, fault: &str, [method, window]: [&str; 2]) -> Value {
-    let folder = TempDir::new().unwrap();
-    let [original, faulty, file] =
-        ["original", "faulty", "file.ltm"].map(|name| folder.path().join(name));
-    let path = |path: &PathBuf| path.to_str().unwrap().to_owned();
-    let [original, faulty, file] = [&original, &faulty, &file].map(path);
-    let run = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
-        let output = command.args(arguments).output().unwrap();
-        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{arguments:?}: {errors}");
-        output.stdout
-    };
-    let size = ["--camera", "48x48", "--light", "24x24", "--patterns", "50"];
-    run(&[&["simulate", scene, "-o", &original], &size[..]].concat());
-    run(&["photograph", &original, "-o", &faulty, "--fault", fault]);
-    let recover = ["recover", &faulty, "-o", &file, "--json"];
-    let report = run(&[&recover[..], &["--method", method, "--window", window]].concat());
-    serde_json::from_slice(&report).unwrap()
+    let (_folder, [capture, file]) = &faulty_capture(scene, "50", fault);
+    let recover = ["recover", capture, "-o", file, "--json"];
+    let report = succeed(&[&recover[..], &["--method", method, "--window", window]].concat());
+    serde_json::from_slice(&report.stdout).unwrap()
 }
 
 #[test]

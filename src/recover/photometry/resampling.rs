@@ -268,13 +268,12 @@ impl<'a> ResamplingInput<'a> {
         spacing: i32,
     ) -> Vec<Vec<f64>> {
         let mut predicted = vec![vec![0.0; inner.extent.area() * CHANNELS]; photographs.len()];
-        let mut windows = Vec::new();
-        for (p, pixel) in inner.pixels().enumerate() {
+        let nearest = |pixel| {
             let LightElement { v, u } = self.geometry.window_origin(pixel);
             let [v, u] = [v, u].map(|i| i.div_euclid(spacing) * spacing + spacing / 2);
-            sampling::add_to_group(&mut windows, LightElement { v, u }, (p, pixel));
-        }
-        for (origin, pixels) in windows {
+            LightElement { v, u }
+        };
+        for (origin, pixels) in sampling::pixels_by_origin(inner, nearest) {
             for (plane, channels) in measurements.planes() {
                 let model = WindowModel::new(
                     measurements,

@@ -34,8 +34,7 @@ export class Structure {
   /** Analyses a photograph soon; nothing ends the analysis. @param {Result | undefined} result */
   show(result) {
     clearTimeout(this.#timer);
-    this.#worker?.terminate();
-    this.#worker = undefined;
+    this.#stop();
     if (!result || result === this.#shown?.result) return;
     this.#timer = setTimeout(() => {
       const worker = new SimulationWorker();
@@ -45,8 +44,7 @@ export class Structure {
         if (worker !== this.#worker) return;
         // The page does without: photograph and light work.
         console.error('The structure of the light transport matrix was not analysed:', error);
-        worker.terminate();
-        this.#worker = undefined;
+        this.#stop();
         this.#shown = undefined;
         this.#draw();
       });
@@ -86,10 +84,14 @@ export class Structure {
       this.#truth = { key: truth.key, values: await worker.call('singularValues') };
     }
     if (worker !== this.#worker) return;
-    worker.terminate();
-    this.#worker = undefined;
+    this.#stop();
     this.#shown = { result, recovered: own, truth: truth && this.#truth?.values };
     this.#draw();
+  }
+
+  #stop() {
+    this.#worker?.terminate();
+    this.#worker = undefined;
   }
 
   #draw() {
