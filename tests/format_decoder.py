@@ -24,6 +24,7 @@ TILE_SIDES = 8, 256
 MAX_RANK = MAX_SCANS = 1024
 MAX_EXTENSION_BYTES = 1 << 24
 MAX_METADATA_BYTES = 1 << 20
+MAX_COLOR_FACTOR = 1000
 MAX_CONTENT_BYTES = MAX_WINDOW_BYTES = 1 << 23
 MAX_EXPONENT = 30
 SPACINGS = 8, 4096
@@ -217,8 +218,14 @@ def read_metadata(data):  # appendix C
     def is_integer(value):
         return type(value) is int
 
+    def is_factor(value):
+        return type(value) in (int, float) and abs(value) <= MAX_COLOR_FACTOR
+
+    def is_triple(value, is_entry):
+        return type(value) is list and len(value) == 3 and all(map(is_entry, value))
+
     def parse_int(text):
-        return int(text) if text[0] != "-" else None
+        return int(text) if text[0] != "-" else float(text)
 
     def refuse_constant(name):
         raise ValueError(name)
@@ -228,6 +235,7 @@ def read_metadata(data):  # appendix C
     counts = {"patterns": is_integer, "photographs": is_integer}
     types["capture"] = lambda value: is_object(value, counts)
     types["shots_used"] = lambda value: type(value) is list and all(map(is_integer, value))
+    types["color_matrix"] = lambda value: is_triple(value, lambda row: is_triple(row, is_factor))
     types["origin"] = lambda value: True
     try:
         decoder = json.JSONDecoder(

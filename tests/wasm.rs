@@ -178,7 +178,7 @@ impl DeviceRelighter {
         exposure: f64,
         quality: f64,
     ) -> Result<(), CodedError> {
-        let output = WebOutputTransform::new(exposure, &[1.0; 3], "clip", "srgb")?;
+        let output = plain_output(exposure)?;
         self.relighter.render(light, &output, quality)
     }
 }
@@ -219,6 +219,12 @@ async fn open_relighter(
         relighter,
         _device: device,
     })
+}
+
+/// As the page makes it, with an exposure only.
+fn plain_output(exposure: f64) -> Result<WebOutputTransform, CodedError> {
+    let matrix = relight::OutputTransform::diagonal([exposure as f32; 3]);
+    WebOutputTransform::new(matrix.as_flattened(), "clip", "srgb")
 }
 
 /// The output transform of pages, with dither.
@@ -613,7 +619,7 @@ async fn a_lost_webgl2_context_is_reported() {
     let light = WebLight::builtin(&photo, "flood").unwrap();
     let hidden = new_canvas();
     let device = GraphicsDevice::webgl2(hidden.clone()).unwrap();
-    let output = WebOutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
+    let output = plain_output(1.0).unwrap();
     let mut relighter = relighter_on(&device, &photo, &new_canvas(), "srgb")
         .await
         .unwrap();
@@ -634,7 +640,7 @@ async fn a_lost_webgl2_context_is_reported() {
 async fn photographs_share_one_device() {
     for backend in ["webgl2", "webgpu"] {
         let device = open_device(backend).await.unwrap();
-        let output = WebOutputTransform::new(1.0, &[1.0; 3], "clip", "srgb").unwrap();
+        let output = plain_output(1.0).unwrap();
         let mut relighters = Vec::new();
         for i in [0, 1, 2, 0] {
             let transport = decoded_transport(i);
@@ -665,7 +671,7 @@ async fn all_output_transforms_match_the_reference() {
     let (transport, photo) = (decoded_transport(0), photo(0));
     let (name, light) = relit::lights(transport.geometry.light).swap_remove(4);
     let web_light = WebLight::builtin(&photo, name).unwrap();
-    let balance = [1.3, 1.0, 0.6];
+    let matrix = [[1.9, -0.7, -0.2], [-0.2, 1.5, -0.3], [0.0, -0.6, 1.6]];
     for backend in BACKENDS {
         let device = open_device(backend).await;
         for gamut in [relight::Gamut::Srgb, relight::Gamut::DisplayP3] {
@@ -677,10 +683,10 @@ async fn all_output_transforms_match_the_reference() {
             assert_eq!(relighter.gamut(), space);
             let curves = [relight::ToneCurve::Clip, relight::ToneCurve::Filmic];
             for (name, curve) in ["clip", "filmic"].into_iter().zip(curves) {
-                let output = WebOutputTransform::new(1.5, &balance, name, space).unwrap();
+                let output = WebOutputTransform::new(matrix.as_flattened(), name, space).unwrap();
                 relighter.render(&web_light, &output, 1.0).unwrap();
                 let reference_output = relight::OutputTransform {
-                    gains: balance.map(|factor| (1.5 * factor) as f32),
+                    matrix,
                     gamut,
                     curve,
                     dither: true,

@@ -93,10 +93,10 @@ impl DisplayLayout {
     }
 
     /// The display's picture, `[display]`, of a code for each light element, `[M]`.
-    pub fn picture(&self, codes: &[u8]) -> Vec<u8> {
+    pub fn picture<T: Copy + Default>(&self, codes: &[T]) -> Vec<T> {
         let [left, top] = self.margin().map(|margin| margin as usize);
         let (width, side) = (self.display.width as usize, self.element_side as usize);
-        let mut picture = vec![0; self.display.area()];
+        let mut picture = vec![T::default(); self.display.area()];
         let elements = codes.chunks_exact(self.light.width as usize);
         let rows = picture.chunks_exact_mut(width).skip(top);
         for (line, codes) in rows.zip(elements.flat_map(|row| std::iter::repeat_n(row, side))) {

@@ -21,7 +21,8 @@ pub use exposure_search::{ExposureSearch, ExposureStep, MAX_FLOOD, MIN_FLOOD};
 pub use pattern_prediction::{PatternPrediction, ShownPattern};
 pub use photograph_statistics::{HISTOGRAM_BINS, PhotographStatistics, luminance, shift_between};
 pub use sequence::{
-    PatternSequence, PictureRole, SEQUENCE_NAME, SequenceError, SequencePicture, SequenceSettings,
+    PatternSequence, PictureRole, Primary, SEQUENCE_NAME, SequenceError, SequencePicture,
+    SequenceSettings,
 };
 pub use sequence_brightness::{PairingFault, SequenceBrightness};
 pub use session_plan::{SessionPlan, SessionSetup};

@@ -11,7 +11,7 @@ use crate::capture::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot
 use crate::simulate::{
     GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, RandomStreamId,
 };
-use crate::transport::{Extent, MAX_SIDE};
+use crate::transport::{CHANNELS, Extent, MAX_SIDE};
 
 /// File name of a sequence.
 pub const SEQUENCE_NAME: &str = "sequence.json";
@@ -42,17 +42,51 @@ pub enum PictureRole {
     },
     /// All elements are lit once more: how far the lamp has drifted.
     Reference,
+    /// All elements are lit by one primary: the camera's colours.
+    Primary {
+        /// The primary.
+        primary: Primary,
+    },
+}
+
+/// A primary of a display.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Primary {
+    /// Channel 0.
+    Red,
+    /// Channel 1.
+    Green,
+    /// Channel 2.
+    Blue,
+}
+
+impl Primary {
+    /// In the order of the channels.
+    pub const ALL: [Self; CHANNELS] = [Self::Red, Self::Green, Self::Blue];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Red => "red",
+            Self::Green => "green",
+            Self::Blue => "blue",
+        }
+    }
 }
 
 impl PictureRole {
     /// The codes of the light elements, `[M]`; `None` of a random pattern, which has a file.
-    pub fn codes(&self, light: Extent) -> Option<Vec<u8>> {
-        let uniform = |code: u8| vec![code; light.area()];
+    pub fn codes(&self, light: Extent) -> Option<PatternImage> {
+        let uniform = |code: u8| PatternImage::uniform(light, code);
         Some(match self {
             Self::Dark => uniform(0),
             Self::Flood | Self::Reference => uniform(u8::MAX),
             Self::Ramp { code } => uniform(*code),
-            Self::GrayCode(pattern) => grey_codes(pattern.codes(light)),
+            Self::GrayCode(pattern) => pattern.codes(light),
+            Self::Primary { primary } => {
+                let codes = Primary::ALL.map(|other| if other == *primary { u8::MAX } else { 0 });
+                PatternImage::Rgb(vec![codes; light.area()])
+            }
             Self::Pattern { .. } => return None,
         })
     }
@@ -139,8 +173,8 @@ pub enum SequenceError {
 }
 
 impl PatternSequence {
-    /// Lists the pictures, and draws them: codes of the light elements, `[M]`, one list for each picture.
-    pub fn draw(settings: &SequenceSettings) -> (Self, Vec<Vec<u8>>) {
+    /// Lists the pictures, and draws them: codes of the light elements, for each picture.
+    pub fn draw(settings: &SequenceSettings) -> (Self, Vec<PatternImage>) {
         let light = settings.layout.light;
         let mut sequence = Self {
             version: 1,
@@ -148,7 +182,7 @@ impl PatternSequence {
             pictures: Vec::new(),
         };
         let mut drawn = Vec::new();
-        let mut show = |role: PictureRole, codes: Option<Vec<u8>>| {
+        let mut show = |role: PictureRole, codes: Option<PatternImage>| {
             drawn.extend(codes.or_else(|| role.codes(light)));
             sequence.add(role);
         };
@@ -166,10 +200,13 @@ impl PatternSequence {
             }
             let mut stream = RandomStreamId::Pattern(i).start(settings.seed);
             let pattern = format!("patterns/{i:04}.png");
-            let codes = grey_codes(settings.ensemble.draw(light, &mut stream));
+            let codes = settings.ensemble.draw(light, &mut stream);
             show(PictureRole::Pattern { pattern }, Some(codes));
         }
         show(PictureRole::Reference, None);
+        for primary in Primary::ALL {
+            show(PictureRole::Primary { primary }, None);
+        }
         (sequence, drawn)
     }
 
@@ -190,6 +227,7 @@ impl PatternSequence {
             PictureRole::Flood => "photos/flood.png".to_owned(),
             PictureRole::Ramp { code } => format!("photos/ramp-{code:03}.png"),
             PictureRole::Reference => format!("photos/reference-{i:04}.png"),
+            PictureRole::Primary { primary } => format!("photos/{}.png", primary.name()),
             PictureRole::Pattern { .. } => format!("photos/{i:04}.png"),
             PictureRole::GrayCode(pattern) => pattern.shot().photo,
         };
@@ -315,7 +353,8 @@ impl PatternSequence {
             match role {
                 PictureRole::Dark => manifest.dark = Some(photo),
                 PictureRole::Flood => manifest.flood = Some(photo),
-                PictureRole::Ramp { .. } | PictureRole::Reference => {}
+                PictureRole::Ramp { .. } | PictureRole::Reference | PictureRole::Primary { .. } => {
+                }
                 PictureRole::GrayCode(pattern) => manifest.graycode.push(GrayCodeShot {
                     photo,
                     ..pattern.shot()
@@ -340,14 +379,6 @@ fn is_png_in(folder: &str, path: &str) -> bool {
         .is_some_and(|stem| !stem.is_empty() && !stem.contains(['/', '\\']))
 }
 
-/// The codes of a pattern that is the same for all primaries.
-fn grey_codes(image: PatternImage) -> Vec<u8> {
-    match image {
-        PatternImage::Grey(codes) => codes,
-        PatternImage::Rgb(codes) => codes.into_iter().map(|[red, ..]| red).collect(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -366,20 +397,28 @@ mod tests {
     fn a_sequence_has_calibration_first_and_a_reference_after_every_ten_patterns() {
         let (sequence, drawn) = PatternSequence::draw(&settings());
         // 4 bits of the columns and 3 of the rows, each with its inverse.
-        assert_eq!(sequence.pictures.len(), 2 + 8 + 14 + 25 + 3);
+        assert_eq!(sequence.pictures.len(), 2 + 8 + 14 + 25 + 3 + 3);
         assert_eq!(drawn.len(), sequence.pictures.len());
         assert_eq!(sequence.pictures[0].role, PictureRole::Dark);
         let references = sequence.pictures.iter().enumerate();
         let references = references.filter(|(_, p)| p.role == PictureRole::Reference);
         let places: Vec<usize> = references.map(|(i, _)| i - 24).collect();
         assert_eq!(places, [10, 21, 27]);
+        let PatternImage::Grey(pattern) = &drawn[24] else {
+            panic!("a random pattern is grey");
+        };
+        assert_eq!(pattern.iter().filter(|&&c| c == 0 || c == 255).count(), 96);
+        let [.., reference, red, green, blue] = &sequence.pictures[..] else {
+            panic!("too few pictures");
+        };
+        assert_eq!(reference.picture, "display/0051-reference-0002.png");
+        assert_eq!(reference.photo, "photos/reference-0002.png");
+        let photos = [red, green, blue].map(|picture| &picture.photo[..]);
         assert_eq!(
-            drawn[24].iter().filter(|&&c| c == 0 || c == 255).count(),
-            96
+            photos,
+            ["photos/red.png", "photos/green.png", "photos/blue.png"]
         );
-        let last = sequence.pictures.last().unwrap();
-        assert_eq!(last.picture, "display/0051-reference-0002.png");
-        assert_eq!(last.photo, "photos/reference-0002.png");
+        assert_eq!(drawn[53], PatternImage::Rgb(vec![[0, 255, 0]; 96]));
     }
 
     #[test]

@@ -35,6 +35,8 @@ pub enum PairingFault {
     NotDark,
     /// It is not as bright as the flood photograph: its brightness relative to that.
     NotLit(f64),
+    /// It is brighter than the flood photograph: its brightness relative to that.
+    BrighterThanFlood(f64),
     /// It is darker than the photograph of a lower code.
     NotRising,
     /// It and the photograph of the inverse do not add up to the flood photograph: by this mean deviation, relative to that.
@@ -124,6 +126,10 @@ impl SequenceBrightness {
                 PictureRole::Reference if (relative(photo) - 1.0).abs() > MAX_DEVIATION => {
                     faults.push((photo, PairingFault::NotLit(relative(photo))));
                 }
+                // It may be nearly dark: there is glass that lets no blue light through.
+                PictureRole::Primary { .. } if relative(photo) > 1.0 + MAX_DEVIATION => {
+                    faults.push((photo, PairingFault::BrighterThanFlood(relative(photo))));
+                }
                 PictureRole::Ramp { code } => {
                     let (code, step) = (f64::from(*code) / 255.0, relative(photo));
                     let [low, high] = RAMP_EXPONENTS.map(|exponent| code.powf(exponent));
@@ -171,8 +177,8 @@ fn mean(values: &[f64]) -> f64 {
 mod tests {
     use super::super::{DisplayLayout, SequenceSettings};
     use super::*;
-    use crate::simulate::{PatternEnsemble, emission};
-    use crate::transport::Extent;
+    use crate::simulate::{PatternEnsemble, PatternImage, emission};
+    use crate::transport::{CHANNELS, Extent};
 
     /// A sequence with its photographs: each part of the picture sees one light element, with stray light and drift.
     fn session() -> (PatternSequence, SequenceBrightness) {
@@ -183,12 +189,14 @@ mod tests {
             ensemble: PatternEnsemble::Bernoulli,
             seed: 3,
         });
-        let photograph = |(i, codes): (usize, &Vec<u8>)| -> Vec<f64> {
+        let photograph = |(i, codes): (usize, &PatternImage)| -> Vec<f64> {
             let drift = 1.0 + 0.0005 * i as f64;
-            codes
-                .iter()
-                .map(|&code| 0.4 * drift * emission(code) + 0.02)
-                .collect()
+            let planes: Vec<Vec<u8>> = (0..CHANNELS).map(|c| codes.plane(c)).collect();
+            let brightness = |m: usize| {
+                let emitted = planes.iter().map(|plane| emission(plane[m]));
+                0.4 * drift * emitted.sum::<f64>() / CHANNELS as f64 + 0.02
+            };
+            (0..light.area()).map(brightness).collect()
         };
         let thumbnails = drawn.iter().enumerate().map(photograph).collect();
         (sequence, SequenceBrightness { thumbnails })

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::error::{CaptureError, CaptureErrorKind};
 use super::measurements::Pattern;
 use crate::calibrate::LightPlaneAxis;
-use crate::transport::{CHANNELS, Correspondence, Extent, MAX_SIDE};
+use crate::transport::{CHANNELS, ColorMatrix, Correspondence, Extent, MAX_COLOR_FACTOR, MAX_SIDE};
 
 /// Largest 16-bit code.
 const MAX_CODE: f64 = 65535.0;
@@ -88,6 +88,9 @@ pub struct ManifestCamera {
     /// Code from which on each channel is saturated; white if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturation: Option<[f64; CHANNELS]>,
+    /// From linear RGB of the photographs to linear sRGB, copied into the `.ltm` file; the identity if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color_matrix: Option<ColorMatrix>,
 }
 
 /// How codes follow from light: the inverse of the camera's response function.
@@ -347,6 +350,15 @@ impl Manifest {
                 format!("above \"camera.black\", {black}, and at most \"camera.white\", {white}");
             let field = format!("camera.saturation[{c}]");
             check(check_range(valid, &field, saturation, &allowed));
+        }
+        for factor in camera
+            .color_matrix
+            .as_ref()
+            .map_or(&[][..], |m| m.as_flattened())
+        {
+            let valid = factor.abs() <= MAX_COLOR_FACTOR;
+            let allowed = format!("at most {MAX_COLOR_FACTOR}");
+            check(check_range(valid, "camera.color_matrix", factor, &allowed));
         }
         check(match camera.response {
             CameraResponse::Linear | CameraResponse::Srgb => Ok(()),

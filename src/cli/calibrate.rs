@@ -1,4 +1,5 @@
-//! `ltm-export calibrate`: the correspondence of a capture from its Gray code, reported and written into its manifest.
+//! `ltm-export calibrate`: the correspondence of a capture from its Gray code, reported and written into its manifest; and what its
+//! photographs say of noise and drift.
 
 use std::path::{Path, PathBuf};
 
@@ -11,11 +12,14 @@ use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde::ser::Serializer;
 use serde_json::value::RawValue;
 
+use super::check::{CheckReport, check_capture};
 use super::output_file::{OutputFile, PNG, temporary_beside};
+use super::process_resources::{Interrupted, InterruptibleCores};
 use super::progress;
 use super::report::{print_json, print_line};
 use crate::calibrate::{GrayCodeFit, ResidualSummary};
-use crate::capture::{CameraRowSet, CaptureFolder, Manifest};
+use crate::capture::{CameraRowSet, CaptureFolder, Manifest, ManifestCamera, NoiseModel};
+use crate::job_executor::Cancelled;
 use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
 
 /// Memory for the photographs of the Gray code, in bytes. Rows are left out of larger ones.
@@ -64,6 +68,43 @@ struct CalibrationReport {
     residual: Option<Distances>,
     /// Those of the affine map alone.
     affine_residual: Option<Distances>,
+    /// Variances of the measurements, as `check` estimates them; null, as is `exposure`, if the patterns' photographs cannot be
+    /// examined.
+    noise: Option<NoiseModel>,
+    exposure: Option<ExposureStability>,
+}
+
+/// How the exposures of a session change, from the gains of its photographs.
+#[derive(Debug, PartialEq, Serialize)]
+struct ExposureStability {
+    /// From the first photograph to the last, along a straight line, as a share of the exposure.
+    drift: f64,
+    /// Standard deviation from this line: of the shutter, for instance.
+    jitter: f64,
+}
+
+impl ExposureStability {
+    /// Of shots by their indices, with their gains.
+    fn new(gains: &[(usize, f64)]) -> Option<Self> {
+        if gains.len() < 3 {
+            return None;
+        }
+        let count = gains.len() as f64;
+        let mean =
+            |value: &dyn Fn(&(usize, f64)) -> f64| gains.iter().map(value).sum::<f64>() / count;
+        let at = |(shot, _): &(usize, f64)| *shot as f64;
+        let (middle, gain) = (mean(&at), mean(&|(_, gain)| *gain));
+        let square = mean(&|own| (at(own) - middle).powi(2));
+        let slope = mean(&|own| (at(own) - middle) * (own.1 - gain)) / square;
+        let error = |own: &(usize, f64)| own.1 - gain - slope * (at(own) - middle);
+        // Two parameters are fitted.
+        let variance = mean(&|own| error(own).powi(2)) * count / (count - 2.0);
+        let (first, last) = (at(&gains[0]), at(&gains[gains.len() - 1]));
+        Some(Self {
+            drift: slope * (last - first) / gain,
+            jitter: variance.sqrt() / gain,
+        })
+    }
 }
 
 /// Distances in light elements.
@@ -118,16 +159,25 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
         draw_map(map, camera, &fit.correspondence)?;
     }
     write_correspondence(&path, &fit.correspondence)?;
+    let spinner = progress::spinner("examining photographs");
+    let examined = examine(&args.folder)?;
+    drop(spinner);
+    let gains = examined.shot_reports.iter();
+    let gains: Vec<(usize, f64)> = gains
+        .filter_map(|shot| Some((shot.shot, shot.gain?)))
+        .collect();
     let report = CalibrationReport {
         decoded: fit.decoded,
         affine: fit.correspondence.affine,
         largest_displacement: largest_displacement(&fit.correspondence),
         residual: fit.residual.map(Distances::from),
         affine_residual: fit.affine_residual.map(Distances::from),
+        noise: examined.examined.map(|examined| examined.noise),
+        exposure: ExposureStability::new(&gains),
     };
     match args.json {
         true => print_json(&report),
-        false => print(&fit, &report),
+        false => print(&fit, &report, &manifest.camera),
     }
 }
 
@@ -142,7 +192,7 @@ fn rows(manifest: &Manifest) -> CameraRowSet {
     CameraRowSet::from_strips((0..count).map(|i| row(i)..row(i) + 1))
 }
 
-fn print(fit: &GrayCodeFit, report: &CalibrationReport) -> Result<()> {
+fn print(fit: &GrayCodeFit, report: &CalibrationReport, camera: &ManifestCamera) -> Result<()> {
     let line = |name: &str, value: &str| print_line(&format!("{name:15} {value}"));
     let decoded = format!("{:.0} % of the camera pixels", 100.0 * report.decoded);
     line("decoded", &decoded)?;
@@ -167,7 +217,40 @@ fn print(fit: &GrayCodeFit, report: &CalibrationReport) -> Result<()> {
     if fit.correspondence.displacement.is_some() {
         line("affine alone", &distances(&report.affine_residual))?;
     }
+    if let Some(noise) = &report.noise {
+        let codes = |variance: f64| variance.sqrt() * (camera.white - camera.black);
+        let [red, green, blue] = noise.floor.map(codes);
+        line(
+            "read noise",
+            &format!("{red:.1}, {green:.1} and {blue:.1} codes of red, green and blue"),
+        )?;
+        let [red, green, blue] = noise.gain.map(|gain| 100.0 * gain.sqrt());
+        line(
+            "shot noise",
+            &format!("{red:.2}, {green:.2} and {blue:.2} % of white, at white"),
+        )?;
+    }
+    if let Some(ExposureStability { drift, jitter }) = &report.exposure {
+        let (drift, jitter) = (100.0 * drift, 100.0 * jitter);
+        line(
+            "exposure",
+            &format!("drifts by {drift:+.1} % over the session, and jitters by {jitter:.1} %"),
+        )?;
+    }
     Ok(())
+}
+
+/// What the photographs of patterns say.
+fn examine(folder: &Path) -> Result<CheckReport> {
+    let cores = InterruptibleCores::listen()?;
+    let examined = check_capture(folder, None, &cores);
+    examined.map_err(|error| match error.is::<Cancelled>() {
+        true => Interrupted(
+            "interrupted; the correspondence is written, noise and drift are not known".to_owned(),
+        )
+        .into(),
+        false => error,
+    })
 }
 
 /// Largest displacement at a control point, in light elements.
@@ -254,6 +337,16 @@ fn write_correspondence(path: &Path, correspondence: &Correspondence) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn exposures_drift_along_a_line_and_jitter_about_it() {
+        let gain = |i: usize| 2.0 * (1.0 + 0.001 * i as f64 + [0.01, -0.01][i % 2]);
+        let gains: Vec<(usize, f64)> = (0..41).map(|i| (i, gain(i))).collect();
+        let ExposureStability { drift, jitter } = ExposureStability::new(&gains).unwrap();
+        assert!((drift - 0.04 / 1.02).abs() < 1e-3, "{drift}");
+        assert!((jitter - 0.01).abs() < 5e-4, "{jitter}");
+        assert_eq!(ExposureStability::new(&gains[..2]), None);
+    }
 
     #[test]
     fn other_fields_of_the_manifest_keep_their_text() {

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
+use serde_json::value::RawValue;
 
 use super::ltm_file::open_ltm;
 use super::report::{format_bytes, format_shots, print_json, print_line};
@@ -53,7 +54,7 @@ struct InspectReport {
     largest_chunk_bytes: u32,
     scans: Vec<ProgressiveScanReport>,
     file_bytes: u64,
-    metadata: Metadata,
+    metadata: Box<RawValue>,
 }
 
 /// One scan, and the prefix of the file up to its end.
@@ -155,20 +156,23 @@ pub fn run(args: &InspectArgs) -> Result<()> {
             .map(|scan| ProgressiveScanReport::new(&index, scan))
             .collect(),
         file_bytes: index.header.file_bytes,
-        metadata: index.metadata.read()?,
+        metadata: RawValue::from_string(index.metadata.text().to_owned())?,
     };
     match args.json {
         true => print_json(&report),
-        false => print(&report),
+        false => print(&report, &index.metadata.read()?),
     }
 }
 
-fn print(report: &InspectReport) -> Result<()> {
+fn print(report: &InspectReport, metadata: &Metadata) -> Result<()> {
     let line = |name: &str, value: &str| print_line(&format!("{name:15} {value}"));
     let [a, b] = report.correspondence;
     let [camera, light] = [report.camera, report.light].map(|[w, h]| format!("{w}x{h}"));
     let rank = report.rank.map(|rank| rank.to_string());
-    let metadata = &report.metadata;
+    let colours = match metadata.color_matrix {
+        Some(_) => "the camera's, with a colour matrix to sRGB",
+        None => "",
+    };
     let displacement = report.displacement.as_ref().map(|displacement| {
         let [columns, rows] = displacement.control_points;
         let largest = displacement.largest;
@@ -193,6 +197,7 @@ fn print(report: &InspectReport) -> Result<()> {
         ("displacement", displacement.unwrap_or_default()),
         ("tiles", tiles),
         ("rank", rank.unwrap_or_default()),
+        ("colours", colours.to_owned()),
         ("recovered", format_recovery(metadata)),
         ("written by", metadata.writer.clone()),
         ("file index", format_bytes(report.index_bytes)),

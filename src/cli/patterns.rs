@@ -16,7 +16,7 @@ use crate::acquisition::{
     DisplayLayout, PatternSequence, PictureRole, SEQUENCE_NAME, SequenceSettings, SessionPlan,
     SessionSetup,
 };
-use crate::simulate::PatternEnsemble;
+use crate::simulate::{PatternEnsemble, PatternImage};
 use crate::transport::Extent;
 
 const DISPLAY_SIDES: RangeInclusive<u32> = 16..=16_384;
@@ -112,7 +112,7 @@ pub fn served_player(json: &str) -> String {
 }
 
 /// Writes the sequence, its pictures and the player into the folder `root`; `codes` are those of the light elements in each.
-fn write(sequence: &PatternSequence, codes: &[Vec<u8>], root: &Path) -> Result<()> {
+fn write(sequence: &PatternSequence, codes: &[PatternImage], root: &Path) -> Result<()> {
     for folder in ["display", "patterns"] {
         std::fs::create_dir(root.join(folder)).context(folder)?;
     }
@@ -124,9 +124,29 @@ fn write(sequence: &PatternSequence, codes: &[Vec<u8>], root: &Path) -> Result<(
     let pictures = sequence.pictures.par_iter().zip(codes);
     pictures.try_for_each(|(picture, codes)| {
         let path = root.join(&picture.picture);
-        let pixels = sequence.layout.picture(codes);
-        write_png(&path, display, &pixels, ExtendedColorType::L8)?;
-        if let PictureRole::Pattern { pattern } = &picture.role {
+        let layout = &sequence.layout;
+        match codes {
+            PatternImage::Grey(codes) => {
+                write_png(
+                    &path,
+                    display,
+                    &layout.picture(codes),
+                    ExtendedColorType::L8,
+                )?;
+            }
+            PatternImage::Rgb(codes) => {
+                let pixels = layout.picture(codes);
+                write_png(
+                    &path,
+                    display,
+                    pixels.as_flattened(),
+                    ExtendedColorType::Rgb8,
+                )?;
+            }
+        }
+        if let (PictureRole::Pattern { pattern }, PatternImage::Grey(codes)) =
+            (&picture.role, codes)
+        {
             write_png(&root.join(pattern), light, codes, ExtendedColorType::L8)?;
         }
         bar.inc(1);

@@ -108,21 +108,24 @@ fn sequence_of(
     Ok(sequence)
 }
 
-/// Emissions `[M]` of the light elements in a picture of the display.
-fn read_emissions(layout: &DisplayLayout, path: &Path) -> Result<Vec<f32>> {
-    let read = || -> Result<Vec<f32>> {
-        let shown = image::open(path)?.into_luma8();
+/// Emissions `[M]` of each primary of the light elements in a picture of the display.
+fn read_emissions(layout: &DisplayLayout, path: &Path) -> Result<[Vec<f32>; CHANNELS]> {
+    let read = || -> Result<[Vec<f32>; CHANNELS]> {
+        let shown = image::open(path)?.into_rgb8();
         ensure!(
             shown.dimensions() == (layout.display.width, layout.display.height),
             "has another size than the display, {}",
             layout.display
         );
-        let code = |(u, v)| {
-            let [x, y] = layout.centre(u, v);
-            shown.get_pixel(x, y).0[0]
+        let emitted = |c: usize| {
+            let cells = layout.light.cells();
+            let of_cell = |(u, v): (u32, u32)| {
+                let [x, y] = layout.centre(u, v);
+                emission(shown.get_pixel(x, y).0[c]) as f32
+            };
+            cells.map(of_cell).collect()
         };
-        let cells = layout.light.cells();
-        Ok(cells.map(|cell| emission(code(cell)) as f32).collect())
+        Ok(std::array::from_fn(emitted))
     };
     read().with_context(|| path.display().to_string())
 }
@@ -137,12 +140,18 @@ fn photograph_picture(args: &PhotographArgs, folder: &Path, path: &Path) -> Resu
     let output = OutputFile::create(&args.output, &PHOTOGRAPH)?;
     let truth = known_transport(args, &CaptureFolder::open(&args.capture)?)?;
     let sequence = sequence_of(args, &truth, folder)?;
-    let mut lights = [read_emissions(&sequence.layout, path)?];
     let light = sequence.layout.light;
     let mut random = RandomStreamId::Fault.start(args.seed);
-    for fault in &args.faults {
-        fault.change_emissions(light, &mut lights, &mut [], &mut random);
-    }
+    let start = random.clone();
+    let lights = read_emissions(&sequence.layout, path)?.map(|emissions| {
+        let mut lights = [emissions];
+        // Every channel's faults are the same.
+        random = start.clone();
+        for fault in &args.faults {
+            fault.change_emissions(light, &mut lights, &mut [], &mut random);
+        }
+        lights.to_vec()
+    });
     let mut pictures = faulty_pictures(args, &truth, &lights, &mut random);
     let picture = pictures.first_mut().context("no picture")?;
     let gain = (args.exposure.seconds / REFERENCE_EXPOSURE) as f32;
@@ -168,33 +177,37 @@ fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
     let layout = sequence.layout;
     let pictures = sequence.pictures.par_iter();
     let emissions = pictures.map(|picture| read_emissions(&layout, &folder.join(&picture.picture)));
-    let emissions = emissions.collect::<Result<Vec<Vec<f32>>>>()?;
+    let emissions = emissions.collect::<Result<Vec<[Vec<f32>; CHANNELS]>>>()?;
     let declared = |fault: &&SessionFault| fault.is_declared();
     if let Some(fault) = args.faults.iter().find(declared) {
         bail!(
             "--fault {fault} is in capture.json, which a sequence does not have yet; photograph a capture with it"
         );
     }
+    let is_pattern = |i: &usize| matches!(sequence.pictures[*i].role, PictureRole::Pattern { .. });
     // What displays do to patterns in particular.
-    let is_pattern = |(i, _): &(usize, Vec<f32>)| {
-        matches!(sequence.pictures[*i].role, PictureRole::Pattern { .. })
-    };
-    let numbered = emissions.into_iter().enumerate();
-    let (patterns, others): (Vec<_>, Vec<_>) = numbered.partition(is_pattern);
-    let order: Vec<usize> = patterns.iter().chain(&others).map(|(i, _)| *i).collect();
-    let [mut lights, mut other_lights] =
-        [patterns, others].map(|list| list.into_iter().map(|(_, light)| light).collect::<Vec<_>>());
+    let (patterns, others): (Vec<usize>, Vec<usize>) = (0..emissions.len()).partition(is_pattern);
     let mut random = RandomStreamId::Fault.start(args.seed);
-    for fault in &args.faults {
-        fault.change_emissions(layout.light, &mut lights, &mut other_lights, &mut random);
-    }
-    let mut emissions = vec![Vec::new(); order.len()];
-    for (i, light) in order
-        .into_iter()
-        .zip(lights.into_iter().chain(other_lights))
-    {
-        emissions[i] = light;
-    }
+    let start = random.clone();
+    let emissions: [Vec<Vec<f32>>; CHANNELS] = std::array::from_fn(|c| {
+        let lights_of = |list: &[usize]| {
+            list.iter()
+                .map(|i| emissions[*i][c].clone())
+                .collect::<Vec<_>>()
+        };
+        let [mut lights, mut other_lights] = [&patterns, &others].map(|list| lights_of(list));
+        // Every channel's faults are the same.
+        random = start.clone();
+        for fault in &args.faults {
+            fault.change_emissions(layout.light, &mut lights, &mut other_lights, &mut random);
+        }
+        let mut changed = vec![Vec::new(); emissions.len()];
+        let order = patterns.iter().chain(&others);
+        for (i, light) in order.zip(lights.into_iter().chain(other_lights)) {
+            changed[*i] = light;
+        }
+        changed
+    });
     let pictures = faulty_pictures(args, &truth, &emissions, &mut random);
     output_folder::write_atomically(&args.output, |root| {
         pictures
@@ -223,15 +236,15 @@ fn known_transport(args: &PhotographArgs, folder: &CaptureFolder) -> Result<Grou
     truth.with_context(|| args.capture.display().to_string())
 }
 
-/// The pictures under grey lights, `[picture][M]`, in the order in which they are taken, with the faults of pictures.
+/// The pictures under lights, of each primary `[picture][M]`, in the order in which they are taken, with the faults of pictures.
 fn faulty_pictures(
     args: &PhotographArgs,
     truth: &GroundTruth,
-    lights: &[Vec<f32>],
+    lights: &[Vec<Vec<f32>>; CHANNELS],
     random: &mut ChaCha8Rng,
 ) -> Vec<LinearPhoto> {
     let channels: Vec<_> = (0..CHANNELS)
-        .map(|c| channel_pictures(truth, c, lights))
+        .map(|c| channel_pictures(truth, c, &lights[c]))
         .collect();
     let mut pictures = interleave(&channels);
     for fault in &args.faults {

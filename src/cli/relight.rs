@@ -92,7 +92,10 @@ pub fn run(args: &RelightArgs) -> Result<()> {
         (None, Some(seconds)) => Light::fire(geometry.light, seconds),
         (None, None) => load_light(&args.light, geometry.light)?,
     };
-    let transform = OutputTransform::srgb(args.exposure);
+    let mut transform = OutputTransform::srgb(args.exposure);
+    if let Some(color_matrix) = file.index.metadata.read()?.color_matrix {
+        transform = transform.with_color_matrix(&color_matrix);
+    }
     let picture = match args.backend {
         RelightImplementation::Cpu => {
             let mut relighter = CpuRelighter::new(Arc::new(file.transport));

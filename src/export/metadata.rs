@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::capture::{Manifest, group_count, group_ids};
 use crate::format::{CaptureMetadata, Metadata};
 use crate::recover::Method;
+use crate::transport::ColorMatrix;
 
 /// Name and version of this package.
 const WRITER: &str = concat!("relightable-photo ", env!("CARGO_PKG_VERSION"));
@@ -21,6 +22,8 @@ pub struct Provenance {
     pub creator: String,
     /// Licence or other terms of use.
     pub rights: String,
+    /// From linear RGB of the photographs to linear sRGB.
+    pub color_matrix: Option<ColorMatrix>,
     /// Indices of the shots that the measurements are of.
     pub shots: Vec<usize>,
     /// The names of their photographs; empty for pictures without names.
@@ -37,6 +40,7 @@ impl Provenance {
             title: manifest.title.clone(),
             creator: manifest.creator.clone(),
             rights: manifest.rights.clone(),
+            color_matrix: manifest.camera.color_matrix,
             shots: shots.to_vec(),
             photographs: listed().map(|shot| shot.photo.clone()).collect(),
             patterns: group_count(&group_ids(listed().map(|shot| &shot.pattern))),
@@ -57,6 +61,7 @@ pub fn metadata(provenance: &Provenance, method: Method) -> Metadata {
         writer: WRITER.to_owned(),
         method: method.name().to_owned(),
         units: UNITS.to_owned(),
+        color_matrix: provenance.color_matrix,
         shots_used: provenance.shots.clone(),
         #[cfg(not(target_arch = "wasm32"))]
         origin: None,

@@ -9,6 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::error::FormatError;
 use super::memory_budget::MemoryBudget;
+use crate::transport::{ColorMatrix, MAX_COLOR_FACTOR, is_valid_color_matrix};
 
 /// Bytes of parsed JSON for each byte of its text, at most: an array grows to twice its length, of eight
 /// bytes for every two characters.
@@ -38,6 +39,10 @@ pub struct Metadata {
     /// Unit of the light transport.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub units: String,
+    /// From linear RGB of the picture to linear sRGB; its primaries are those of sRGB if left out.
+    /// [`MetadataText`] writes it: the serialiser's way to write numbers would be 11 kB of a WebAssembly module.
+    #[serde(skip_serializing, deserialize_with = "read_color_matrix")]
+    pub color_matrix: Option<ColorMatrix>,
     /// Indices of the capture's shots that the recovery used. The others can validate it.
     pub shots_used: Vec<usize>,
     /// How and from what the file was made; pages neither write nor read it.
@@ -62,8 +67,13 @@ pub struct MetadataText(String);
 
 impl MetadataText {
     /// The JSON of `metadata`.
-    pub(super) fn encode(metadata: &Metadata) -> Result<Self, FormatError> {
-        let json = serde_json::to_string(metadata).map_err(invalid)?;
+    pub(crate) fn encode(metadata: &Metadata) -> Result<Self, FormatError> {
+        let mut json = serde_json::to_string(metadata).map_err(invalid)?;
+        if let Some(matrix) = &metadata.color_matrix {
+            let matrix = color_matrix_json(matrix);
+            // Other fields follow, as some are always written.
+            json.insert_str(1, &format!("\"color_matrix\":{matrix},"));
+        }
         Ok(Self(json))
     }
 
@@ -100,6 +110,29 @@ impl MetadataText {
     }
 }
 
+/// The JSON of a matrix, with four decimals.
+fn color_matrix_json(matrix: &ColorMatrix) -> String {
+    let decimal = |factor: f64| {
+        let number = (factor * 1e4).round() as i32;
+        let sign = if number < 0 { "-" } else { "" };
+        let [integer, decimals] = [number.abs() / 10_000, number.abs() % 10_000];
+        format!("{sign}{integer}.{decimals:04}")
+    };
+    let rows = matrix.map(|row| format!("[{}]", row.map(decimal).join(",")));
+    format!("[{}]", rows.join(","))
+}
+
+/// Reads a matrix, which cannot be null.
+fn read_color_matrix<'de, D: Deserializer<'de>>(from: D) -> Result<Option<ColorMatrix>, D::Error> {
+    let matrix = ColorMatrix::deserialize(from)?;
+    match is_valid_color_matrix(&matrix) {
+        true => Ok(Some(matrix)),
+        false => Err(serde::de::Error::custom(format_args!(
+            "color_matrix has a factor beyond {MAX_COLOR_FACTOR}"
+        ))),
+    }
+}
+
 /// The error as text, which keeps serde's type out of the WebAssembly module.
 fn invalid(error: impl fmt::Display) -> FormatError {
     FormatError::InvalidMetadata(error.to_string())
@@ -132,8 +165,19 @@ mod tests {
         let json = decode(br#"{"title": "A", "other": ["B"]}"#).unwrap();
         let title = json.read().unwrap().title;
         assert_eq!(title, "A");
-        for bad in [&b"[]"[..], b"{} {}", b"", b"{\"other\": \"\xFF\"}"] {
+        for bad in [
+            &b"[]"[..],
+            b"{} {}",
+            b"",
+            b"{\"other\": \"\xFF\"}",
+            b"{\"color_matrix\": null}",
+            b"{\"color_matrix\": [[1, 0], [0, 1]]}",
+            b"{\"color_matrix\": [[1, 0, 0], [0, 1, 0], [0, 0, 1001]]}",
+        ] {
             assert!(decode(bad).is_err(), "{}", bad.escape_ascii());
         }
+        let json = decode(br#"{"color_matrix": [[1, -0.5, 0], [0, 1, 0], [0, 0, 1]]}"#).unwrap();
+        let matrix = json.read().unwrap().color_matrix;
+        assert_eq!(matrix.unwrap()[0], [1.0, -0.5, 0.0]);
     }
 }

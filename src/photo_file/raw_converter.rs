@@ -1,8 +1,8 @@
-//! Raw files, by `dcraw_emu`, a program of LibRaw: as a process of its own, which crashes and hangs alone, and whose licence
-//! (LGPL or CDDL) does not concern this program.
+//! Raw files, by `dcraw_emu` and `raw-identify`, programs of LibRaw: as processes of their own, which crash and hang alone, and
+//! whose licence (LGPL or CDDL) does not concern this program.
 //!
-//! The program sees the raw file in an empty folder that is removed afterwards, so that it writes nothing beside the user's
-//! files. In old versions its exit status is 0 whatever happens: success is a picture, and no message of damaged data.
+//! They see the raw file in an empty folder that is removed afterwards, so that they write nothing beside the user's files. In old
+//! versions the exit status of `dcraw_emu` is 0 whatever happens: success is a picture, and no message of damaged data.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -53,6 +53,11 @@ const TIMEOUT: Duration = Duration::from_secs(300);
 const MAX_POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// File of what the program writes to standard error.
 const MESSAGES: &str = "messages";
+/// File of what `raw-identify` writes.
+const DESCRIPTION: &str = "description";
+/// The heading of the matrix in it, and the beginning of the line of factors.
+const CAMERA_TO_SRGB: &str = "camRGB -> sRGB Matrix:";
+const DAYLIGHT_FACTORS: &str = "Derived D65 multipliers:";
 /// Bytes of the messages that are read: the last ones.
 const MAX_MESSAGE_BYTES: u64 = 4096;
 /// Parts of LibRaw's messages about damaged data, of which it still writes a picture.
@@ -110,18 +115,21 @@ pub enum RawConversionError {
     Io(#[from] io::Error),
 }
 
-/// Converts raw files to linear samples of 16 bits: 0 is the sensor's black, and 65535 its white.
+/// Reads raw files: linear samples of 16 bits, of which 0 is the sensor's black and 65535 its white, and the camera's colours.
 #[derive(Clone, Debug)]
 pub struct RawConverter {
     program: PathBuf,
+    /// The program that says what a raw file is.
+    identifier: PathBuf,
     timeout: Duration,
 }
 
 impl Default for RawConverter {
-    /// `dcraw_emu` on the path.
+    /// `dcraw_emu` and `raw-identify` on the path.
     fn default() -> Self {
         Self {
             program: PathBuf::from("dcraw_emu"),
+            identifier: PathBuf::from("raw-identify"),
             timeout: TIMEOUT,
         }
     }
@@ -142,7 +150,8 @@ impl RawConverter {
         let folder = TempDir::with_prefix_in("raw-", scratch)?;
         let name = format!("photo.{}", extension(path));
         link(&path.canonicalize()?, &folder.path().join(&name))?;
-        let status = self.run(folder.path(), &name)?;
+        let command = Command::new(&self.program);
+        let status = self.run(command, &OPTIONS, folder.path(), &name, Stdio::null())?;
         let messages = last_messages(&folder.path().join(MESSAGES)).unwrap_or_default();
         let is_damaged = DAMAGE.iter().any(|damage| messages.contains(damage));
         let picture = picture(folder.path())?.filter(|_| status.success() && !is_damaged);
@@ -170,29 +179,57 @@ impl RawConverter {
         }
     }
 
+    /// The matrix from the RGB of the raw file at `path` to linear sRGB, row by row, with the white balance of daylight, D65; `None` if
+    /// neither the file nor LibRaw knows it. Temporary files go to a new folder in `scratch`, and are removed.
+    ///
+    /// # Errors
+    /// If the program is missing or takes too long.
+    pub fn camera_to_srgb(
+        &self,
+        path: &Path,
+        scratch: &Path,
+    ) -> Result<Option<[[f64; CHANNELS]; CHANNELS]>, RawConversionError> {
+        let folder = TempDir::with_prefix_in("raw-", scratch)?;
+        let name = format!("photo.{}", extension(path));
+        link(&path.canonicalize()?, &folder.path().join(&name))?;
+        let description = folder.path().join(DESCRIPTION);
+        let output = File::create(&description)?.into();
+        let command = Command::new(&self.identifier);
+        self.run(command, &["-v"], folder.path(), &name, output)?;
+        let description = fs::read(description)?;
+        Ok(parse_camera_to_srgb(&String::from_utf8_lossy(&description)))
+    }
+
     fn name(&self) -> String {
         self.program.display().to_string()
     }
 
-    /// Runs the program until it ends, or has run for too long.
-    fn run(&self, folder: &Path, name: &str) -> Result<ExitStatus, RawConversionError> {
+    /// Runs a program with `options` on the file `name` in `folder` until it ends, or has run for too long.
+    fn run(
+        &self,
+        mut command: Command,
+        options: &[&str],
+        folder: &Path,
+        name: &str,
+        output: Stdio,
+    ) -> Result<ExitStatus, RawConversionError> {
         let messages = File::create(folder.join(MESSAGES))?;
-        let mut command = Command::new(&self.program);
         command
-            .args(OPTIONS)
+            .args(options)
             .arg(name)
             .current_dir(folder)
             // Several files are converted at once.
             .env("OMP_NUM_THREADS", "1")
             .stdin(Stdio::null())
-            .stdout(Stdio::null())
+            .stdout(output)
             .stderr(messages);
+        let program = command.get_program().to_string_lossy().into_owned();
         let mut process = command.spawn().map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => RawConversionError::ProgramMissing {
-                program: self.name(),
+                program: program.clone(),
             },
             _ => RawConversionError::NotStarted {
-                program: self.name(),
+                program: program.clone(),
                 error,
             },
         })?;
@@ -206,7 +243,7 @@ impl RawConverter {
                 process.kill()?;
                 process.wait()?;
                 return Err(RawConversionError::TimedOut {
-                    program: self.name(),
+                    program,
                     timeout: self.timeout,
                 });
             }
@@ -214,6 +251,26 @@ impl RawConverter {
             interval = (2 * interval).min(MAX_POLL_INTERVAL);
         }
     }
+}
+
+/// The matrix in what `raw-identify -v` says: a heading and a row of numbers for each channel, for a camera with white balance; and
+/// the factors of that.
+fn parse_camera_to_srgb(description: &str) -> Option<[[f64; CHANNELS]; CHANNELS]> {
+    let numbers = |text: &str| -> Option<[f64; CHANNELS]> {
+        let numbers = text.split_whitespace().map(|text| text.parse().ok());
+        numbers.collect::<Option<Vec<f64>>>()?.try_into().ok()
+    };
+    let mut lines = description.lines();
+    lines.find(|line| line.trim() == CAMERA_TO_SRGB)?;
+    let mut matrix = [[0.0; CHANNELS]; CHANNELS];
+    for row in &mut matrix {
+        *row = numbers(lines.next()?)?;
+    }
+    let factors = lines.find_map(|line| line.strip_prefix(DAYLIGHT_FACTORS))?;
+    let factors = numbers(factors)?;
+    // Of a camera that is not known, LibRaw has the identity.
+    let is_known = (0..CHANNELS).any(|i| (0..CHANNELS).any(|j| i != j && matrix[i][j] != 0.0));
+    is_known.then(|| matrix.map(|row| std::array::from_fn(|c| row[c] * factors[c])))
 }
 
 /// The extension of a raw file; a few formats are told by it.
@@ -288,6 +345,25 @@ mod tests {
             ("", "it says nothing, and ends with exit status: 0"),
         ] {
             assert_eq!(reason(messages, "photo.cr2", status), expected);
+        }
+    }
+
+    #[test]
+    fn the_matrix_of_a_camera_is_three_rows_of_three_numbers_and_three_factors() {
+        let heading = "Raw colors: 3\n\ncamRGB -> sRGB Matrix:\n";
+        let rows = "1.5\t-0.5\t0\n-0.25\t1.5\t-0.25\n0\t-0.5\t1.5\n";
+        let factors = "\nother\n\nDerived D65 multipliers: 2 1 1.5\n";
+        let expected = [[3.0, -0.5, 0.0], [-0.5, 1.5, -0.375], [0.0, -0.5, 2.25]];
+        let known = [heading, rows, factors].concat();
+        assert_eq!(parse_camera_to_srgb(&known), Some(expected));
+        let unknown_camera = "1\t0\t0\n0\t1\t0\n0\t0\t1\n";
+        for other in [
+            String::new(),
+            [heading, rows].concat(),
+            [heading, "1\t2\n1\t2\n1\t2\n", factors].concat(),
+            [heading, unknown_camera, factors].concat(),
+        ] {
+            assert_eq!(parse_camera_to_srgb(&other), None, "{other}");
         }
     }
 

@@ -31,7 +31,7 @@ pub mod webgpu;
 
 pub use light::{BuiltinLight, Light, LightError, TorchSpot};
 pub use light_chroma::LightChroma;
-pub use output_transform::{Gamut, OutputTransform, ToneCurve};
+pub use output_transform::{Gamut, OutputMatrix, OutputTransform, ToneCurve};
 pub use picture::{LinearPicture, Picture, Rgba8Picture};
 pub use resample::area_resample;
 

@@ -1,16 +1,16 @@
-//! The output transform, from linear light to the codes of a canvas: gains (exposure and white balance), gamut, tone
-//! curve, transfer function and dither, in this order, for each channel of a pixel.
+//! The output transform, from linear light to the codes of a canvas: the photograph's colour matrix with exposure and
+//! white balance, gamut, tone curve, transfer function and dither, in this order, for each pixel.
 
 use std::sync::LazyLock;
 
 use super::srgb::srgb_encode;
-use crate::transport::{CHANNELS, CameraPixel};
+use crate::transport::{CHANNELS, CameraPixel, ColorMatrix, convert_color};
 
 /// How linear light becomes codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutputTransform {
-    /// Exposure times white balance, for each channel.
-    pub gains: [f32; CHANNELS],
+    /// From the photograph's linear RGB to linear sRGB, row by row, times exposure and white balance.
+    pub matrix: OutputMatrix,
     /// The canvas's gamut.
     pub gamut: Gamut,
     /// The tone curve.
@@ -19,7 +19,10 @@ pub struct OutputTransform {
     pub dither: bool,
 }
 
-/// Primaries of a canvas. The linear light has those of sRGB.
+/// From linear RGB to linear RGB, row by row, in single precision.
+pub type OutputMatrix = [[f32; CHANNELS]; CHANNELS];
+
+/// Primaries of a canvas.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gamut {
     /// IEC 61966-2-1.
@@ -39,27 +42,52 @@ pub enum ToneCurve {
 }
 
 impl OutputTransform {
-    /// To sRGB without dither, for comparisons.
+    /// To sRGB without dither, for a photograph whose primaries are those of sRGB.
     pub fn srgb(exposure: f32) -> Self {
         Self {
-            gains: [exposure; CHANNELS],
+            matrix: Self::diagonal([exposure; CHANNELS]),
             gamut: Gamut::Srgb,
             curve: ToneCurve::Clip,
             dither: false,
         }
     }
 
+    /// The same for a photograph with this colour matrix.
+    pub fn with_color_matrix(self, color_matrix: &ColorMatrix) -> Self {
+        Self {
+            matrix: product(
+                &self.matrix,
+                &color_matrix.map(|row| row.map(|factor| factor as f32)),
+            ),
+            ..self
+        }
+    }
+
+    /// The matrix of one factor for each channel.
+    pub fn diagonal(factors: [f32; CHANNELS]) -> OutputMatrix {
+        let mut matrix = [[0.0; CHANNELS]; CHANNELS];
+        for (c, factor) in factors.into_iter().enumerate() {
+            matrix[c][c] = factor;
+        }
+        matrix
+    }
+
+    /// The matrix from the photograph's linear RGB to linear RGB of the gamut.
+    pub(super) fn gamut_matrix(&self) -> OutputMatrix {
+        product(&self.gamut.from_srgb(), &self.matrix)
+    }
+
     /// Linear RGB to encoded values of 0..=1, before dither. NaN becomes 0.
     pub fn encode(&self, linear: [f64; CHANNELS]) -> [f64; CHANNELS] {
-        let exposed: [f64; CHANNELS] =
-            std::array::from_fn(|c| linear[c] * f64::from(self.gains[c]));
-        let converted = match self.gamut {
-            Gamut::Srgb => exposed,
-            Gamut::DisplayP3 => {
-                let matrix = self.gamut.from_srgb();
-                matrix.map(|row| (0..CHANNELS).map(|c| f64::from(row[c]) * exposed[c]).sum())
-            }
+        let converted = |row: [f32; CHANNELS]| {
+            // A factor of 0 leaves a channel out, also one that is not finite.
+            let terms = row
+                .into_iter()
+                .zip(linear)
+                .filter(|(factor, _)| *factor != 0.0);
+            terms.map(|(factor, y)| f64::from(factor) * y).sum()
         };
+        let converted: [f64; CHANNELS] = self.gamut_matrix().map(converted);
         converted.map(|y| srgb_encode(self.curve.apply(y)))
     }
 
@@ -74,6 +102,11 @@ impl OutputTransform {
     }
 }
 
+/// The matrix of the conversion by `first`, followed by that of `second`.
+fn product(second: &OutputMatrix, first: &OutputMatrix) -> OutputMatrix {
+    second.map(|row| std::array::from_fn(|c| (0..CHANNELS).map(|k| row[k] * first[k][c]).sum()))
+}
+
 impl Gamut {
     /// The CSS name.
     pub fn color_space(self) -> &'static str {
@@ -84,7 +117,7 @@ impl Gamut {
     }
 
     /// The matrix from linear sRGB to this gamut, row by row.
-    pub fn from_srgb(self) -> [[f32; CHANNELS]; CHANNELS] {
+    pub fn from_srgb(self) -> OutputMatrix {
         match self {
             Self::Srgb => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             // CSS Color Module Level 4, both through XYZ.
@@ -133,10 +166,10 @@ pub fn bayer(at: CameraPixel) -> u32 {
 #[derive(Debug)]
 pub struct TabulatedOutputTransform {
     table: &'static OutputCodeTable,
-    /// The gains, repeated for each pixel of a batch.
+    /// The matrix's diagonal, repeated for each pixel of a batch.
     gains: [f32; CHANNELS * BATCH_PIXELS],
-    /// `None` for sRGB.
-    matrix: Option<[[f32; CHANNELS]; CHANNELS]>,
+    /// `None` if it has nothing beside the diagonal.
+    matrix: Option<OutputMatrix>,
     dither: bool,
     /// Table entries per square root of a linear value.
     scale: f32,
@@ -159,10 +192,12 @@ impl TabulatedOutputTransform {
             LazyLock::new(|| output_code_table(ToneCurve::Clip)),
             LazyLock::new(|| output_code_table(ToneCurve::Filmic)),
         ];
+        let matrix = output.gamut_matrix();
+        let diagonal: [f32; CHANNELS] = std::array::from_fn(|c| matrix[c][c]);
         Self {
             table: &TABLES[usize::from(output.curve == ToneCurve::Filmic)],
-            gains: std::array::from_fn(|i| output.gains[i % CHANNELS]),
-            matrix: (output.gamut != Gamut::Srgb).then(|| output.gamut.from_srgb()),
+            gains: std::array::from_fn(|i| diagonal[i % CHANNELS]),
+            matrix: (matrix != OutputTransform::diagonal(diagonal)).then_some(matrix),
             dither: output.dither,
             scale: TABLE_ENTRIES as f32 / output.curve.white().sqrt(),
         }
@@ -190,14 +225,19 @@ impl TabulatedOutputTransform {
         {
             // A separate loop before the table look-ups, which the compiler vectorises.
             let mut exposed = [0.0f32; CHANNELS * BATCH_PIXELS];
-            let values = linear.as_flattened();
-            for ((exposed, value), gain) in exposed.iter_mut().zip(values).zip(&self.gains) {
-                *exposed = value * gain;
-            }
-            if let Some(matrix) = &self.matrix {
-                for pixel in exposed.as_chunks_mut::<CHANNELS>().0 {
-                    let [r, g, b] = *pixel;
-                    *pixel = matrix.map(|row| row[0] * r + row[1] * g + row[2] * b);
+            match &self.matrix {
+                None => {
+                    let values = linear.as_flattened();
+                    for ((exposed, value), gain) in exposed.iter_mut().zip(values).zip(&self.gains)
+                    {
+                        *exposed = value * gain;
+                    }
+                }
+                Some(matrix) => {
+                    let exposed = exposed.as_chunks_mut::<CHANNELS>().0;
+                    for (exposed, linear) in exposed.iter_mut().zip(linear) {
+                        *exposed = convert_color(matrix, *linear);
+                    }
                 }
             }
             let indices = exposed.map(|value| {
@@ -237,13 +277,15 @@ mod tests {
         for gamut in [Gamut::Srgb, Gamut::DisplayP3] {
             for curve in [ToneCurve::Clip, ToneCurve::Filmic] {
                 for dither in [false, true] {
-                    let gains = [1.5, 1.0, 0.7];
-                    all.push(OutputTransform {
-                        gains,
-                        gamut,
-                        curve,
-                        dither,
-                    });
+                    let mixing = [[1.9, -0.7, -0.2], [-0.2, 1.5, -0.3], [0.0, -0.6, 1.6]];
+                    for matrix in [OutputTransform::diagonal([1.5, 1.0, 0.7]), mixing] {
+                        all.push(OutputTransform {
+                            matrix,
+                            gamut,
+                            curve,
+                            dither,
+                        });
+                    }
                 }
             }
         }
@@ -269,7 +311,7 @@ mod tests {
                 let at = CameraPixel { x: 5, y };
                 encoder.encode(&linear, at, &mut out);
                 for (i, (linear, out)) in linear.iter().zip(&out).enumerate() {
-                    if output.gamut != Gamut::Srgb && linear.iter().any(|y| !y.is_finite()) {
+                    if encoder.matrix.is_some() && linear.iter().any(|y| !y.is_finite()) {
                         continue; // the matrix makes NaN of infinities
                     }
                     let at = CameraPixel { x: 5 + i as u32, y };
@@ -333,7 +375,7 @@ mod tests {
     fn white_stays_white_and_tone_curves_are_monotonic() {
         for output in outputs() {
             let white = OutputTransform {
-                gains: [9.0; 3],
+                matrix: output.matrix.map(|row| row.map(|factor| 9.0 * factor)),
                 ..output
             };
             assert_eq!(white.codes([1.0; 3], CameraPixel { x: 0, y: 0 }), [255; 3]);

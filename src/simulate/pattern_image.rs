@@ -31,6 +31,14 @@ pub enum PatternImage {
 }
 
 impl PatternImage {
+    /// The codes of primary `c`, `[M]`.
+    pub fn plane(&self, c: usize) -> Vec<u8> {
+        match self {
+            Self::Grey(codes) => codes.clone(),
+            Self::Rgb(codes) => codes.iter().map(|code| code[c]).collect(),
+        }
+    }
+
     /// The same grey code for all elements.
     pub fn uniform(light: Extent, code: u8) -> Self {
         Self::Grey(vec![code; light.area()])

@@ -8,6 +8,7 @@
 //! values of a tile as real numbers ([`FloatTile`]) and as codes ([`Tile`]), the distance of two transports
 //! ([`SnrAccumulator`]), and their singular values ([`SingularValueAnalysis`]).
 
+mod color_matrix;
 mod correspondence;
 #[cfg_attr(
     all(target_arch = "wasm32", feature = "recovery", not(feature = "drawing")),
@@ -23,6 +24,7 @@ mod singular_values;
 mod snr;
 mod tile;
 
+pub use color_matrix::{ColorMatrix, MAX_COLOR_FACTOR, convert_color, is_valid_color_matrix};
 pub use correspondence::Correspondence;
 pub use displacement_grid::{DisplacementGrid, SharedGrid};
 pub use float_tile::{Basis, FloatTile, TileTransportFunctions};

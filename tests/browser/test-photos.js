@@ -23,6 +23,12 @@ export const TALL_FILE = join(FOLDER, 'tall.ltm');
 /** The tall photograph has one tile in each row of tiles, so up to four workers share it. */
 export const TALL_TILE_ROWS = 4;
 const TILE_SIDE_PX = 128;
+/** As of a camera whose channels overlap. */
+const TALL_COLOR_MATRIX = [
+  [1.9, -0.7, -0.2],
+  [-0.2, 1.5, -0.3],
+  [0, -0.6, 1.6],
+];
 const DEMO = join(repository, 'target/demo/photos');
 
 /** A light image whose size does not divide the light plane: patches of colour, with grain. @type {Picture} */
@@ -82,6 +88,10 @@ function makeTallPhoto() {
   const camera = `${TILE_SIDE_PX}x${TILE_SIDE_PX * TALL_TILE_ROWS}`;
   const size = ['--camera', camera, '--light', '128x128', '--patterns', '30', '--seed', '1'];
   run('simulate', 'stained-glass', ...size, '-o', capture);
+  const manifest = join(capture, 'capture.json');
+  const fields = JSON.parse(readFileSync(manifest, 'utf8'));
+  fields.camera.color_matrix = TALL_COLOR_MATRIX;
+  writeFileSync(manifest, JSON.stringify(fields));
   run('recover', capture, '--window', '5', '-o', TALL_FILE);
 }
 

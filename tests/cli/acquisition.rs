@@ -66,7 +66,7 @@ fn photographs_that_do_not_fit_the_sequence_are_refused_by_name() {
     fs::rename(session.photo(14), &hidden).unwrap();
     let error = session.refusal();
     assert!(
-        error.contains("there are 82 photographs of 83 pictures"),
+        error.contains("there are 85 photographs of 86 pictures"),
         "{error}"
     );
     assert!(
@@ -159,7 +159,7 @@ fn wrong_input_is_named_with_its_remedy() {
     );
     let raw = photo.with_extension("CR2");
     fs::rename(&photo, &raw).unwrap();
-    let names = (0..83).map(|i| {
+    let names = (0..86).map(|i| {
         if i == 3 {
             raw.clone()
         } else {
@@ -194,7 +194,7 @@ fn wrong_input_is_named_with_its_remedy() {
 fn photographs_of_other_types_are_read() {
     let session = Session::new();
     // 8 bits with the curve of sRGB, of which some are grey, and some have an alpha channel, as TIFF.
-    for i in 0..83 {
+    for i in 0..86 {
         let photo = session.photo(i);
         let linear = image::open(&photo).unwrap().into_rgb16();
         let encoded = image::RgbImage::from_fn(48, 48, |x, y| {

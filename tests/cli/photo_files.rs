@@ -7,14 +7,16 @@ use std::process::{Command, Output};
 
 use half::f16;
 use image::{ImageBuffer, Rgb};
+use relightable_photo::calibrate;
+use relightable_photo::relight::srgb::srgb_decode;
 
-use crate::common::tiff_writer::{RgbSamples, bayer_dng, rgb_tiff};
-use crate::session::{Session, stderr_text};
+use crate::common::tiff_writer::{DNG_XYZ_TO_CAMERA, RgbSamples, bayer_dng, rgb_tiff};
+use crate::session::{Session, stderr_text, succeed};
 
 type Photo = ImageBuffer<Rgb<u16>, Vec<u16>>;
 
 /// Pictures of a session, each with a photograph.
-const PICTURES: usize = 83;
+const PICTURES: usize = 86;
 const SIZE: [u32; 2] = [48, 48];
 /// Levels of the simulated camera.
 const BLACK: f64 = 512.0;
@@ -174,6 +176,75 @@ fn raw_files_become_linear_measurements() {
         assert_eq!(photo.get_pixel(0, 0).0, [u16::MAX; 3]);
         assert_eq!(photo.get_pixel(1, 0).0, [0; 3]);
         assert_eq!(photo.get_pixel(2, 0).0, [0; 3]);
+    }
+}
+
+/// The RGB of the DNG files' sensor of each primary of sRGB, as columns.
+fn dng_primaries() -> [[f64; 3]; 3] {
+    // To CIE XYZ (IEC 61966-2-1).
+    const SRGB_TO_XYZ: [[f64; 3]; 3] = [
+        [0.412_456_4, 0.357_576_1, 0.180_437_5],
+        [0.212_672_9, 0.715_152_2, 0.072_175],
+        [0.019_333_9, 0.119_192, 0.950_304_1],
+    ];
+    DNG_XYZ_TO_CAMERA.map(|row| {
+        let product = |c: usize| (0..3).map(|k| row[k] * SRGB_TO_XYZ[k][c]).sum();
+        std::array::from_fn(product)
+    })
+}
+
+/// The sensor of the DNG files mixes the light of the display's primaries, which the object dims.
+#[test]
+fn the_colours_of_a_camera_become_those_of_the_display_when_the_picture_is_shown() {
+    ensure_dcraw_emu();
+    let primaries = dng_primaries();
+    let brightest = calibrate::white_of(&primaries)
+        .into_iter()
+        .fold(0.0, f64::max);
+    let mixed = |[r, g, b]: [f64; 3]| {
+        primaries.map(|row| ((row[0] * r + row[1] * g + row[2] * b) / brightest).max(0.0))
+    };
+    let (session, _) = session_of(|_, light| {
+        let light: Vec<[f64; 3]> = light.iter().map(|light| mixed(*light)).collect();
+        ("dng", dng(&light))
+    });
+    let output = assemble(&session, &[]);
+    assert!(output.status.success(), "{}", stderr_text(&output));
+    let found = &session.manifest()["camera"]["color_matrix"];
+    let found: [[f64; 3]; 3] = serde_json::from_value(found.clone()).unwrap();
+    let expected = calibrate::color_matrix(&primaries).unwrap();
+    for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+        assert!((found - expected).abs() < 0.03, "{found} {expected}");
+    }
+    let [sequence, file] = ["sequence", "file.ltm"].map(|name| session.text(name));
+    succeed(&[
+        "recover",
+        &sequence,
+        "-o",
+        &file,
+        "--window",
+        "9",
+        "--patterns",
+        "40",
+        "--lossless",
+    ]);
+    let inspected = succeed(&["inspect", &file, "--json"]).stdout;
+    let inspected: serde_json::Value = serde_json::from_slice(&inspected).unwrap();
+    let kept: [[f64; 3]; 3] =
+        serde_json::from_value(inspected["metadata"]["color_matrix"].clone()).unwrap();
+    assert_eq!(kept, found);
+    let relit = session.path("relit.png");
+    let relight = ["relight", &file, "--light", "flood", "-o"];
+    succeed(&[&relight[..], &[relit.to_str().unwrap()]].concat());
+    let relit = image::open(relit).unwrap().into_rgb8();
+    let flood = light(&read_rgb16(&session.photo(1)));
+    // On average: recovery and noise make pixels differ.
+    for c in 0..3 {
+        let shown = relit
+            .pixels()
+            .map(|pixel| srgb_decode(f64::from(pixel.0[c]) / 255.0));
+        let (shown, lit): (f64, f64) = (shown.sum(), flood.iter().map(|light| light[c]).sum());
+        assert!((shown / lit - 1.0).abs() < 0.05, "{c}: {}", shown / lit);
     }
 }
 

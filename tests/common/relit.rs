@@ -91,25 +91,27 @@ pub fn lights(extent: Extent) -> Vec<(&'static str, Light)> {
     lights
 }
 
-/// Output transforms that together use all features; the first has an exposure only.
+/// Output transforms that together have all features; the first has an exposure only.
 pub fn output_transforms(exposure: f32) -> [OutputTransform; 4] {
     let plain = OutputTransform::srgb(exposure);
-    let gains = [1.3, 1.0, 0.6].map(|gain| gain * exposure);
+    let matrix = OutputTransform::diagonal([1.3, 1.0, 0.6].map(|gain| gain * exposure));
+    // As of a camera whose channels overlap.
+    let mixing = [[1.9, -0.7, -0.2], [-0.2, 1.5, -0.3], [0.0, -0.6, 1.6]];
     let (gamut, curve) = (Gamut::DisplayP3, ToneCurve::Filmic);
     [
         plain,
         OutputTransform {
-            gains,
+            matrix,
             dither: true,
             ..plain
         },
         OutputTransform {
-            gains: [4.0 * exposure; 3],
+            matrix: mixing.map(|row| row.map(|factor: f32| 4.0 * exposure * factor)),
             curve,
             ..plain
         },
         OutputTransform {
-            gains,
+            matrix,
             gamut,
             curve,
             dither: true,

@@ -122,9 +122,19 @@ pub fn rgb_tiff(size: [u32; 2], samples: RgbSamples, bytes: &[u8]) -> Vec<u8> {
     tiff_file(&tags, bytes)
 }
 
+/// From CIE XYZ to the RGB of the sensor of [`bayer_dng`].
+pub const DNG_XYZ_TO_CAMERA: [[f64; 3]; 3] = [
+    [0.6722, -0.0635, -0.0963],
+    [-0.4287, 1.2460, 0.2028],
+    [-0.0908, 0.2162, 0.5668],
+];
+
 /// A DNG of a sensor whose 2 x 2 colours are red, green, green and blue, each with its black level. The camera was turned.
 pub fn bayer_dng(size: [u32; 2], codes: &[u16], black: [u16; 4], white: u32) -> Vec<u8> {
-    let matrix = [6722, -635, -963, -4287, 12460, 2028, -908, 2162, 5668].map(|n| [n, 10_000]);
+    let matrix = DNG_XYZ_TO_CAMERA.as_flattened().iter();
+    let matrix: Vec<[i32; 2]> = matrix
+        .map(|factor| [(factor * 1e4).round() as i32, 10_000])
+        .collect();
     let tags = [
         (254, TagValue::Longs(&[0])),
         (256, TagValue::Longs(&size[..1])),

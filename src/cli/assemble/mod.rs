@@ -1,9 +1,11 @@
 //! `ltm-export assemble`: pairs photographs with the pictures of a sequence, and makes a capture folder of them.
 
+mod color_matrix;
 mod develop_all;
 mod level_warnings;
 mod photograph_file;
 mod photograph_list;
+mod rotation;
 mod session;
 
 use std::path::{Path, PathBuf};
@@ -12,12 +14,14 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use tempfile::TempDir;
 
+pub use self::color_matrix::raw_color_matrix;
 pub use self::develop_all::{check_cancelled, develop_all};
 pub use self::level_warnings::{PhotographLevels, warn_of_clipping};
 pub use self::photograph_file::{
     DevelopSettings, DevelopedPhotograph, SampleKind, develop, thumbnail_part,
 };
 pub use self::photograph_list::{is_photograph, photographs};
+use self::rotation::Rotation;
 use self::session::wrong_count;
 pub use self::session::{FOLDERS, Session, fault_text};
 use super::progress;
@@ -66,6 +70,9 @@ pub struct DevelopArgs {
     /// Keep a part of the picture, in pixels before averaging
     #[arg(long, value_name = "X,Y,WxH", value_parser = parse_rect)]
     crop: Option<TileRect>,
+    /// Turn the picture clockwise by 90, 180 or 270 degrees, after --crop
+    #[arg(long, value_name = "DEGREES", value_parser = parse_rotation)]
+    rotate: Option<Rotation>,
 }
 
 impl DevelopArgs {
@@ -84,6 +91,7 @@ impl DevelopArgs {
             white: self.white,
             bin: self.bin,
             crop: self.crop,
+            rotate: self.rotate.unwrap_or(Rotation::NONE),
         })
     }
 }
@@ -100,6 +108,11 @@ fn parse_response(text: &str) -> Result<CameraResponse, String> {
                 .ok_or_else(|| "give linear, srgb, or gamma=N with N from 0.1 to 10".to_owned())
         }
     }
+}
+
+fn parse_rotation(text: &str) -> Result<Rotation, String> {
+    let rotation = text.parse().ok().and_then(Rotation::from_degrees);
+    rotation.ok_or_else(|| "give 90, 180 or 270".to_owned())
 }
 
 fn parse_level(text: &str) -> Result<f64, String> {

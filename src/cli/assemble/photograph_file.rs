@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::photograph_list::{is_picture, is_raw};
+use super::rotation::Rotation;
 use crate::capture::{CameraResponse, ManifestCamera};
 use crate::photo_file::{PhotoSamples, RawConverter, decode_photo};
 use crate::transport::{CHANNELS, Extent, TileRect};
@@ -77,6 +78,9 @@ pub struct DevelopSettings {
     pub bin: u32,
     /// The part of the picture that is kept, in pixels before averaging.
     pub crop: Option<TileRect>,
+    /// How the part that is kept is turned.
+    #[serde(default)]
+    pub rotate: Rotation,
 }
 
 /// The numbers of black and white.
@@ -212,15 +216,23 @@ fn develop_samples(
         response: settings.response(),
         bin: settings.bin,
     };
-    let sample = |x: u32, y: u32| samples.pixel(rect.x + x, rect.y + y);
-    let averaged = match development.average(rect.extent, sample) {
+    let place = |x: u32, y: u32| {
+        let (x, y) = settings.rotate.source(rect.extent, x, y);
+        (rect.x + x, rect.y + y)
+    };
+    let sample = |x: u32, y: u32| {
+        let (x, y) = place(x, y);
+        samples.pixel(x, y)
+    };
+    let averaged = match development.average(settings.rotate.extent(rect.extent), sample) {
         Ok(averaged) => averaged,
-        Err(NotANumber { x, y }) => bail!(
-            "has a sample at ({}, {}) that is not a number, or minus infinity; export it again, or write 0 for pixels that the \
-             converter cannot compute",
-            rect.x + x,
-            rect.y + y
-        ),
+        Err(NotANumber { x, y }) => {
+            let (x, y) = place(x, y);
+            bail!(
+                "has a sample at ({x}, {y}) that is not a number, or minus infinity; export it again, or write 0 for pixels that the \
+                 converter cannot compute"
+            )
+        }
     };
     let count = (averaged.codes.len() * CHANNELS) as f64;
     let pile = averaged.pile(stored);
@@ -403,6 +415,7 @@ mod tests {
         white: Some(60_000.0),
         bin: 2,
         crop: None,
+        rotate: Rotation::NONE,
     };
 
     fn development(settings: &DevelopSettings, kind: SampleKind) -> Development {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use super::color_matrix::session_color_matrix;
 use super::develop_all::develop_all;
 use super::fit_gray_code;
 use super::level_warnings::{PhotographLevels, warn_of_clipping};
@@ -75,7 +76,11 @@ impl Session {
         let paths = self.paths.iter().map(PathBuf::as_path);
         warn_of_clipping(self.levels.iter().zip(paths));
         let response = self.display_response();
-        let manifest = self.sequence.manifest(self.camera.clone(), response);
+        let camera = ManifestCamera {
+            color_matrix: session_color_matrix(self),
+            ..self.camera.clone()
+        };
+        let manifest = self.sequence.manifest(camera, response);
         self.move_into_place(folder, &manifest)?;
         let summary = format!(
             "{}: {} shots of {} pixels",
@@ -157,7 +162,7 @@ impl Session {
     }
 
     /// Photographs of a role, by their numbers.
-    fn photos_of(&self, is_of_role: impl Fn(&PictureRole) -> bool) -> Vec<usize> {
+    pub fn photos_of(&self, is_of_role: impl Fn(&PictureRole) -> bool) -> Vec<usize> {
         let pictures = self.sequence.pictures.iter().enumerate();
         let found = pictures.filter(|(_, picture)| is_of_role(&picture.role));
         found.map(|(i, _)| i).collect()
@@ -250,6 +255,9 @@ pub fn fault_text(path: &str, picture: &str, fault: PairingFault) -> String {
         PairingFault::NotDark => format!("{path} is not dark, as {picture} is"),
         PairingFault::NotLit(relative) => format!(
             "{path} is {relative:.2} times as bright as the flood photograph, and should be equally bright, as {picture} is"
+        ),
+        PairingFault::BrighterThanFlood(relative) => format!(
+            "{path} is {relative:.2} times as bright as the flood photograph, and should be darker, as {picture} is"
         ),
         PairingFault::NotRising => {
             format!("{path} is not between its neighbours in brightness, as {picture} is")

@@ -73,18 +73,18 @@ pub fn run(args: &CheckArgs) -> Result<()> {
     }
 }
 
-/// Checks the capture at `capture`, as for a recovery in `window`.
+/// Checks the capture at `capture`, as for a recovery in `window`; `None` to estimate it.
 ///
 /// # Errors
 /// If it is no capture folder, or the command is interrupted.
 pub fn check_capture(
     capture: &Path,
-    window: Window,
+    window: Option<Window>,
     cores: &InterruptibleCores,
 ) -> Result<CheckReport> {
     let args = CheckArgs {
         capture: capture.to_owned(),
-        window: Some(window),
+        window,
         strict: false,
         json: false,
     };

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::assemble::{
     DevelopArgs, DevelopSettings, check_cancelled, develop_all, fit_gray_code, photographs,
-    warn_of_clipping,
+    raw_color_matrix, warn_of_clipping,
 };
 use super::calibrate::{IMPLAUSIBLE_FIT, is_implausible};
 use super::capture_writer::write_png;
@@ -269,7 +269,13 @@ impl Session {
         if let Some(i) = self.flood {
             photos.levels[i].warn_of_flood(&paths[i]);
         }
-        Ok(photos.camera)
+        let color_matrix = paths
+            .first()
+            .and_then(|path| raw_color_matrix(path, folder));
+        Ok(ManifestCamera {
+            color_matrix,
+            ..photos.camera
+        })
     }
 
     /// The side of the smallest element that the Gray code numbers along both axes; `None` without Gray code.

@@ -94,7 +94,7 @@ fn examine(args: &ReportArgs, cores: &InterruptibleCores) -> Result<(QualityRepo
     let folder = CaptureFolder::open(&args.capture)?;
     ensure_same_geometry(&file.index.header.geometry, &args.file, &folder)?;
     let window = file.index.header.geometry.window;
-    let check = check_capture(&args.capture, window, cores)?;
+    let check = check_capture(&args.capture, Some(window), cores)?;
     let noise = check.examined.as_ref().map(|examined| examined.noise);
     let metadata = file.index.metadata.read()?;
     let shots = folder.manifest().shots.len();
@@ -107,7 +107,8 @@ fn examine(args: &ReportArgs, cores: &InterruptibleCores) -> Result<(QualityRepo
     let file_snr = file.index.scans.last().map(|scan| scan.snr);
     let text = file.index.metadata.text().to_owned();
     let used = metadata.shots_used;
-    let predictions = Predictions::new(file.transport, &folder, &used, noise, cores)?;
+    let color_matrix = metadata.color_matrix.as_ref();
+    let predictions = Predictions::new(file.transport, &folder, &used, noise, color_matrix, cores)?;
     let provenance = CaptureOrigin::read(&args.file, &text, &used, &folder, cores)?;
     let residual = match folder.manifest().graycode.is_empty() {
         true => None,

@@ -12,7 +12,9 @@ use crate::cli::process_resources::{AllCoresExecutor, InterruptibleCores};
 use crate::job_executor::Executor;
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light, TorchSpot};
-use crate::transport::{CHANNELS, Decibels, Extent, SnrAccumulator, Transport};
+use crate::transport::{
+    CHANNELS, ColorMatrix, Decibels, Extent, SnrAccumulator, Transport, convert_color,
+};
 
 /// Places of the torch, as shares of the picture.
 const TORCHES: [(&str, [f64; 2]); 3] = [
@@ -70,9 +72,19 @@ pub struct ReportPicture {
 }
 
 impl ReportPicture {
-    /// From a picture of the camera; saturated samples, which are not finite, become white.
-    fn new(caption: &'static str, camera: Extent, pixels: &[[f32; CHANNELS]]) -> Self {
-        let white = white_of(pixels);
+    /// From a picture of the camera, whose colours become those of sRGB; saturated samples, which are not finite, become white.
+    fn new(
+        caption: &'static str,
+        camera: Extent,
+        mut pixels: Vec<[f32; CHANNELS]>,
+        color_matrix: Option<&ColorMatrix>,
+    ) -> Self {
+        if let Some(matrix) = color_matrix {
+            let matrix = matrix.map(|row| row.map(|factor| factor as f32));
+            let convert = |pixel: &mut [f32; CHANNELS]| *pixel = convert_color(&matrix, *pixel);
+            pixels.iter_mut().for_each(convert);
+        }
+        let white = white_of(&pixels);
         let values = pixels.as_flattened().iter();
         let values = values.map(|y| if y.is_finite() { *y } else { white });
         let (extent, values) = reduced(camera, values.collect());
@@ -101,7 +113,7 @@ pub struct Predictions {
 }
 
 impl Predictions {
-    /// Of the photographs that are not `used`.
+    /// Of the photographs that are not `used`; `color_matrix` is for pictures.
     ///
     /// # Errors
     /// If a photograph cannot be read, or the command is interrupted.
@@ -110,6 +122,7 @@ impl Predictions {
         folder: &CaptureFolder,
         used: &[usize],
         noise: Option<NoiseModel>,
+        color_matrix: Option<&ColorMatrix>,
         cores: &InterruptibleCores,
     ) -> Result<Self> {
         let geometry = transport.geometry.clone();
@@ -146,8 +159,9 @@ impl Predictions {
             }
             found.flood_snr = snr.snr();
             found.edge_correlation = found.edge_correlation(&measured);
-            let picture = ReportPicture::new("Photograph", geometry.camera, &measured);
-            found.flood = Some((picture, histogram(&measured)));
+            let histogram = histogram(&measured);
+            let picture = ReportPicture::new("Photograph", geometry.camera, measured, color_matrix);
+            found.flood = Some((picture, histogram));
         }
         let spot =
             |[x, y]: [f64; 2]| Light::torch(geometry.light, TorchSpot::behind(&geometry, x, y));
@@ -158,7 +172,7 @@ impl Predictions {
         for (caption, light) in lights {
             relighter.relight(&light, &AllCoresExecutor);
             let pixels = linear_rgb(&relighter);
-            let picture = ReportPicture::new(caption, geometry.camera, &pixels);
+            let picture = ReportPicture::new(caption, geometry.camera, pixels, color_matrix);
             found.relit.push(picture);
         }
         Ok(found)

@@ -1,13 +1,14 @@
 //! `ltm-export shoot`: shows the pictures of a sequence, photographs each, checks it at once, and makes a capture folder.
 //!
 //! A page in a browser shows the pictures ([`player_server`]); a command or a tethering program takes the photographs
-//! ([`camera`]); every photograph is checked against those before ([`photograph_check`]) and kept ([`session_store`]).
+//! ([`camera`]); the first find exposure time and delay ([`trial_photographs`]); every photograph is checked against those before ([`photograph_check`]) and kept ([`session_store`]).
 
 mod camera;
 mod photograph_check;
 mod photographer;
 mod player_server;
 mod session_store;
+mod trial_photographs;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -102,6 +103,7 @@ pub fn run(args: &ShootArgs) -> Result<()> {
         folder: args.folder.clone(),
         bar: progress::bar("photographs", count),
         exposure: None,
+        settle: settings.settle,
         photographs: 0,
     };
     let shot = shoot(args, &mut photographer, &mut store);
@@ -199,6 +201,11 @@ fn check_settings(
         ("--white", was.white != is.white, format!("{:?}", was.white)),
         ("--bin", was.bin != is.bin, was.bin.to_string()),
         ("--crop", was.crop != is.crop, format!("{:?}", was.crop)),
+        (
+            "--rotate",
+            was.rotate != is.rotate,
+            was.rotate.degrees().to_string(),
+        ),
     ];
     if let Some((option, _, was)) = differences.iter().find(|(_, differs, _)| *differs) {
         bail!("the session was begun with another {option}, {was}; give the same, {begin_again}");
@@ -230,6 +237,10 @@ fn shoot(
             let mut exposures = args.exposures.clone();
             exposures.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
             let chosen = photographer.find_exposure(store, &exposures)?;
+            // An operator is slower than a display.
+            if matches!(photographer.settings.camera, CameraSource::Command(_)) {
+                photographer.find_settle(store)?;
+            }
             let exposure = photographer.exposure.as_ref();
             let settings = SessionSettings {
                 develop: photographer.settings.develop.clone(),
@@ -237,6 +248,7 @@ fn shoot(
                 exposure: exposure.map(|exposure| exposure.name.clone()),
                 flood_brightness: chosen.flood_brightness,
                 is_saturation_accepted: chosen.is_saturation_accepted,
+                settle_seconds: photographer.settle.as_secs_f32(),
             };
             store.write_settings(&settings)?;
             settings
@@ -246,6 +258,8 @@ fn shoot(
         Some(name) => Some(Exposure::parse(name).map_err(Error::msg)?),
         None => None,
     };
+    let begun_with = Duration::from_secs_f32(settings.settle_seconds);
+    photographer.settle = begun_with.max(photographer.settings.settle);
     photographer.run(store, &settings)?;
     Ok(settings)
 }

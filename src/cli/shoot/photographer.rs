@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use indicatif::ProgressBar;
 use tempfile::TempDir;
 
@@ -13,9 +13,7 @@ use super::camera::{CameraError, CameraSource, Exposure, PhotographRequest};
 use super::photograph_check::{GrayCodeError, PhotographCheck, Verdict};
 use super::player_server::{PlayerServer, PlayerState, ShownPicture};
 use super::session_store::{PhotographRecord, SessionSettings, SessionStore};
-use crate::acquisition::{
-    ExposureSearch, ExposureStep, MAX_FLOOD, MIN_FLOOD, PhotographStatistics, PictureRole,
-};
+use crate::acquisition::{PhotographStatistics, PictureRole};
 use crate::cli::assemble::{
     DevelopSettings, DevelopedPhotograph, PhotographLevels, check_cancelled, develop,
 };
@@ -34,7 +32,7 @@ pub struct ShootingSettings {
     pub camera: CameraSource,
     /// Extension of `{file}`.
     pub extension: String,
-    /// Between a picture and its photograph.
+    /// Between a picture and its photograph, at least.
     pub settle: Duration,
     /// For one photograph.
     pub timeout: Duration,
@@ -46,13 +44,13 @@ pub struct ShootingSettings {
 }
 
 /// A photograph that was just taken.
-struct Taken {
+pub(super) struct Taken {
     path: PathBuf,
     /// What the camera wrote into, removed in the end.
     _incoming: TempDir,
     at: SystemTime,
-    developed: DevelopedPhotograph,
-    statistics: PhotographStatistics,
+    pub(super) developed: DevelopedPhotograph,
+    pub(super) statistics: PhotographStatistics,
 }
 
 /// Photographs of a picture so far.
@@ -73,18 +71,10 @@ enum GrayCodeDecoding {
     Done,
 }
 
-/// What the exposure that was chosen leads to.
-pub struct ChosenExposure {
-    /// Brightness of the brightest part of the flood, as a share of white.
-    pub flood_brightness: f64,
-    /// Whether the operator goes on although it is saturated.
-    pub is_saturation_accepted: bool,
-}
-
 /// A photograph that may succeed the next time.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-struct FailedAttempt(String);
+pub(super) struct FailedAttempt(String);
 
 pub struct Photographer<'a> {
     pub settings: &'a ShootingSettings,
@@ -94,6 +84,8 @@ pub struct Photographer<'a> {
     pub bar: ProgressBar,
     /// The camera's exposure time.
     pub exposure: Option<Exposure>,
+    /// Between a picture and its photograph.
+    pub settle: Duration,
     /// Photographs so far.
     pub photographs: u64,
 }
@@ -242,122 +234,15 @@ impl Photographer<'_> {
         }
     }
 
-    /// Finds the exposure time of the flood among `exposures`, which rise, or asks the operator for it if there are none.
-    ///
-    /// # Errors
-    /// If even the shortest is too bright, or no photograph can be taken.
-    pub fn find_exposure(
-        &mut self,
-        store: &SessionStore,
-        exposures: &[Exposure],
-    ) -> Result<ChosenExposure> {
-        let flood = store.sequence.position(&PictureRole::Flood);
-        let flood = flood.context("the sequence has no flood")?;
-        if exposures.is_empty() {
-            return self.ask_for_exposure(store, flood);
-        }
-        let mut search =
-            ExposureSearch::new(exposures.iter().map(|exposure| exposure.seconds).collect());
-        let mut measured = vec![0.0; exposures.len()];
-        let chosen = |flood_brightness: f64| ChosenExposure {
-            flood_brightness,
-            is_saturation_accepted: false,
-        };
-        loop {
-            match search.step() {
-                ExposureStep::Photograph(i) => {
-                    self.exposure = Some(exposures[i].clone());
-                    let (brightest, is_saturated) = self.brightness(store, flood)?;
-                    self.say(&format!(
-                        "exposure {} s: {}",
-                        exposures[i].name,
-                        brightness_text(brightest, is_saturated)
-                    ));
-                    search.add(i, brightest, is_saturated);
-                    measured[i] = brightest;
-                }
-                ExposureStep::Found(i) => {
-                    self.exposure = Some(exposures[i].clone());
-                    return Ok(chosen(measured[i]));
-                }
-                ExposureStep::TooDark(i, brightest) => {
-                    self.exposure = Some(exposures[i].clone());
-                    self.say(&format!(
-                        "warning: with {} s, the longest of --exposures, {}; longer ones would lower the noise",
-                        exposures[i].name,
-                        brightness_text(brightest, false)
-                    ));
-                    return Ok(chosen(brightest));
-                }
-                ExposureStep::TooBright => bail!(
-                    "with {} s, the shortest of --exposures, the flood is too bright; close the aperture, lower the sensitivity, or give \
-                     shorter times",
-                    exposures[0].name
-                ),
-            }
-        }
-    }
-
-    fn ask_for_exposure(&mut self, store: &SessionStore, flood: usize) -> Result<ChosenExposure> {
-        loop {
-            let (brightest, is_saturated) = self.brightness(store, flood)?;
-            let found = brightness_text(brightest, is_saturated);
-            if !is_saturated && (MIN_FLOOD..=MAX_FLOOD * 1.3).contains(&brightest) {
-                self.say(&format!("exposure: {found}"));
-                return Ok(ChosenExposure {
-                    flood_brightness: brightest,
-                    is_saturation_accepted: false,
-                });
-            }
-            let advice = match is_saturated {
-                true => "expose a quarter as long".to_owned(),
-                false => format!(
-                    "expose about {:.1} times as long",
-                    MAX_FLOOD / brightest.max(0.01)
-                ),
-            };
-            let question = format!(
-                "Under the flood, {found}: {advice}, then photograph again; or go on as it is."
-            );
-            self.say(&format!(
-                "{question} The page of the player has the buttons."
-            ));
-            if !self.ask(&question)? {
-                return Ok(ChosenExposure {
-                    flood_brightness: brightest,
-                    is_saturation_accepted: is_saturated,
-                });
-            }
-        }
-    }
-
-    /// The brightest part of the flood, and whether it is saturated.
-    fn brightness(&mut self, store: &SessionStore, flood: usize) -> Result<(f64, bool)> {
-        let mut attempt = 0;
-        loop {
-            attempt += 1;
-            match self.take(store, flood, attempt) {
-                Ok(taken) => {
-                    let levels = PhotographLevels::of(&taken.developed);
-                    return Ok((taken.statistics.brightest, levels.is_saturated()));
-                }
-                Err(error) if error.is::<FailedAttempt>() && attempt < self.settings.attempts => {
-                    self.say(&format!("{error}; photographed again"));
-                }
-                Err(error) => return Err(error),
-            }
-        }
-    }
-
     /// Shows picture `i`, photographs it, and develops the photograph.
-    fn take(&mut self, store: &SessionStore, i: usize, attempt: u32) -> Result<Taken> {
+    pub(super) fn take(&mut self, store: &SessionStore, i: usize, attempt: u32) -> Result<Taken> {
         let picture = &store.sequence.pictures[i];
         let (path, incoming, at) = loop {
             let before = self.settings.camera.files_before();
             let before = before.map_err(|error| FailedAttempt(error.to_string()))?;
             let shown = self.show(i, &picture.picture)?;
             // A display that was late may be so again.
-            self.wait(self.settings.settle * attempt)?;
+            self.wait(self.settle * attempt)?;
             let incoming = store.incoming()?;
             let request = PhotographRequest {
                 number: i,
@@ -458,7 +343,7 @@ impl Photographer<'_> {
     }
 
     /// Asks on the page, and returns whether to photograph again.
-    fn ask(&self, question: &str) -> Result<bool> {
+    pub(super) fn ask(&self, question: &str) -> Result<bool> {
         let answered = self.server.player().answer.0;
         self.server
             .update(|state| state.question = Some(question.to_owned()));
@@ -483,19 +368,9 @@ impl Photographer<'_> {
     }
 
     /// Tells the user and the operator at the page.
-    fn say(&self, text: &str) {
+    pub(super) fn say(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
         self.server.update(|state| state.message = text.to_owned());
-    }
-}
-
-fn brightness_text(brightest: f64, is_saturated: bool) -> String {
-    match is_saturated {
-        true => "the brightest part is saturated".to_owned(),
-        false => format!(
-            "the brightest part is at {:.0} % of white",
-            100.0 * brightest
-        ),
     }
 }
 

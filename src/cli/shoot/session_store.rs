@@ -43,6 +43,9 @@ pub struct SessionSettings {
     pub flood_brightness: f64,
     /// Whether the operator has accepted that the flood is saturated.
     pub is_saturation_accepted: bool,
+    /// Time between a picture and its photograph that was found.
+    #[serde(default)]
+    pub settle_seconds: f32,
 }
 
 /// A photograph that was accepted.
@@ -92,6 +95,8 @@ struct SessionLog<'a> {
     version: u32,
     #[serde(skip_serializing_if = "Option::is_none")]
     exposure: Option<&'a str>,
+    /// Between a picture and its photograph, at least.
+    settle_seconds: f32,
     photographs: Vec<LoggedPhotograph<'a>>,
 }
 
@@ -270,6 +275,7 @@ impl SessionStore {
         let log = SessionLog {
             version: 1,
             exposure: settings.exposure.as_deref(),
+            settle_seconds: settings.settle_seconds,
             photographs: photographs.collect(),
         };
         write_json(&self.folder.join(LOG_NAME), &log)

@@ -1,7 +1,7 @@
 // What several passes of a frame read: the light and the uniforms. The Rust side is texture_layout/.
 
 struct FrameUniforms {
-    // From linear sRGB to linear RGB of the canvas's gamut, row by row, with exposure and white balance.
+    // From the photograph's linear RGB to that of the canvas's gamut, row by row, with exposure and white balance.
     output_matrix: array<vec4<f32>, 3>,
     // Each channel of a light of uniform chroma, relative to its base channel; else 1.
     chroma: vec4<f32>,

@@ -59,10 +59,8 @@ impl TextureLayout {
             LightChroma::Uniform { factors, .. } => (0, factors),
             LightChroma::Varying => (2 * self.quad_pairs() as i32, [1.0; CHANNELS]),
         };
-        let [red, green, blue] = output.gains;
-        let row = |row: [f32; CHANNELS]| [row[0] * red, row[1] * green, row[2] * blue, 0.0];
         FrameUniforms {
-            output_matrix: output.gamut.from_srgb().map(row),
+            output_matrix: output.gamut_matrix().map(|[r, g, b]| [r, g, b, 0.0]),
             chroma: [r, g, b, 0.0],
             base_channel: Self::CHANNEL_WEIGHTS[chroma.channels()[0]],
             window: self.geometry.window.side() as i32,

@@ -190,6 +190,7 @@ impl MeasurementBuilder {
         let patterns = &measurements.patterns;
         let first = |pattern: &Pattern| patterns.iter().position(|other| other == pattern);
         let provenance = Provenance {
+            color_matrix: None,
             title,
             creator,
             rights,

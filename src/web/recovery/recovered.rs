@@ -5,6 +5,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::recovery_job::Recovery;
 use crate::export;
+use crate::format::MetadataText;
 use crate::relight::{Light, reference};
 use crate::transport::{
     CHANNELS, CameraPixel, Geometry, SnrAccumulator, Tile, TileTransportFunctions, Transport,
@@ -36,14 +37,15 @@ impl Recovery {
         let tiles = (0..geometry.tile_grid().area()).map(tile);
         let tiles = tiles.collect::<Result<_, _>>();
         let tiles = tiles.map_err(|e| CodedError::internal(&e.to_string()))?;
-        let metadata = serde_json::to_string(&self.metadata()).unwrap_or_default();
+        let metadata = MetadataText::encode(&self.metadata());
+        let metadata = metadata.map_err(|e| CodedError::internal(&e.to_string()))?;
         Ok(RecoveredTransport {
             transport: Transport {
                 geometry,
                 basis,
                 tiles,
             },
-            metadata,
+            metadata: metadata.text().to_owned(),
         })
     }
 }

@@ -85,7 +85,12 @@ export async function relight(
       photo.relighter ??= new module.RowRangeRelighter(modulePhoto, 0, height);
       const { relighter } = photo;
       const lightInModule = createLight(module, modulePhoto, light);
-      const transform = createOutputTransform(module, output, outputGamut);
+      const transform = createOutputTransform(
+        module,
+        output,
+        photo.photograph.colorMatrix,
+        outputGamut,
+      );
       try {
         const [first = 0, end = 0] = relighter.lightRows;
         const out = new Uint8Array(pixels.buffer);

@@ -136,7 +136,8 @@ export interface RelightModule {
     fromSrgb(photo: ImportedPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
   };
   OutputTransform: {
-    new (exposure: number, balance: Float64Array, curve: ToneCurve, gamut: Gamut): OutputTransform;
+    /** `matrix` is the photograph's colour matrix, row by row, times exposure and white balance. */
+    new (matrix: Float32Array, curve: ToneCurve, gamut: Gamut): OutputTransform;
   };
 }
 

@@ -241,8 +241,18 @@ test('a module without memory leaves the tiles where they are', async () => {
   assert.equal(state.alive, 0);
 });
 
-test('metadata that is not a JSON object is format-invalid, and the photograph is freed', () => {
-  for (const metadata of ['[]', '', '1', '{"a": }', 'null']) {
+test('the metadata has the colour matrix', () => {
+  const { photo } = fakePhoto(1);
+  assert.deepEqual(LoadedPhotograph.fromModule(photo).colorMatrix[1], [0, 1, 0]);
+  const metadata = '{"color_matrix": [[1.9, -0.7, -0.2], [-0.2, 1.5, -0.3], [0, -0.6, 1.6]]}';
+  const { colorMatrix } = LoadedPhotograph.fromModule({ ...fakePhoto(1).photo, metadata });
+  assert.deepEqual(colorMatrix[2], [0, -0.6, 1.6]);
+});
+
+test('metadata of another form is format-invalid, and the photograph is freed', () => {
+  const wrongMatrices = ['null', '[]', '[1, 1, 1]', '[[1, 0, 0], [0, 1, 0], [0, 0, 1001]]'];
+  const withMatrices = wrongMatrices.map((matrix) => `{"color_matrix": ${matrix}}`);
+  for (const metadata of ['[]', '', '1', '{"a": }', 'null', ...withMatrices]) {
     const { photo, state } = fakePhoto(1);
     const wrong = { ...photo, metadata };
     assert.throws(() => LoadedPhotograph.fromModule(wrong), { code: 'format-invalid' });

@@ -12,7 +12,8 @@ import type {
 } from '../engine/wasm-exports.js';
 import { messageOf, PhotoError, photoReleased } from '../shared/errors.js';
 import { allSettledOrThrow } from '../shared/promises.js';
-import type { PhotoInfo } from '../shared/value-types.js';
+import type { ColorMatrix, PhotoInfo } from '../shared/value-types.js';
+import { parseColorMatrix, parseMetadata } from './metadata.js';
 import {
   describePhoto,
   type PhotoDescriptor,
@@ -35,6 +36,7 @@ type TileLocation = ModuleTiles | 'workers' | 'in transit' | TransferredTile;
 
 export class LoadedPhotograph implements Freeable {
   readonly info: PhotoInfo;
+  readonly colorMatrix: ColorMatrix;
   #tiles: TileLocation[];
   /** One, unless a move has failed halfway. */
   readonly #stores = new Set<ModuleTiles>();
@@ -52,6 +54,7 @@ export class LoadedPhotograph implements Freeable {
   ) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
     const metadata = parseMetadata(descriptor.metadata);
+    this.colorMatrix = parseColorMatrix(metadata.color_matrix);
     this.info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
     this.#tiles = tiles;
   }
@@ -252,17 +255,4 @@ async function forEachTile(session: TilesInWorkers, move: (index: number) => Pro
       for (const index of tiles) await move(index);
     }),
   );
-}
-
-function parseMetadata(json: string): unknown {
-  try {
-    const metadata: unknown = JSON.parse(json);
-    if (typeof metadata === 'object' && metadata !== null && !Array.isArray(metadata)) {
-      return metadata;
-    }
-  } catch {
-    // Not JSON.
-  }
-  const message = "The file's metadata is not a JSON object. Export it again.";
-  throw new PhotoError('format-invalid', message);
 }

@@ -28,7 +28,7 @@ export function createModuleRenderer(
     gamut,
     qualityController: new QualityController(),
     render(setting, output, quality) {
-      const transform = createOutputTransform(module, output, gamut);
+      const transform = createOutputTransform(module, output, photograph.colorMatrix, gamut);
       try {
         if (upload(relighter, setting.image)) {
           hasUploadedImage = true;

@@ -32,6 +32,9 @@ export const CENTRE: PicturePoint = { x: 0.5, y: 0.5 };
 
 export type RgbGains = readonly [red: number, green: number, blue: number];
 
+/** From linear RGB of a photograph to linear sRGB, row by row. */
+export type ColorMatrix = readonly [RgbGains, RgbGains, RgbGains];
+
 export function clampToPicture({ x, y }: PicturePoint): PicturePoint {
   return { x: clampAndRound(x, 0, 1), y: clampAndRound(y, 0, 1) };
 }

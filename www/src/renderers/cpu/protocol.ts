@@ -3,10 +3,12 @@
 import type { OutputSettings } from '../../engine/output-settings.js';
 import type { Gamut } from '../../engine/wasm-exports.js';
 import type { PhotoDescriptor } from '../../photo/types.js';
+import type { ColorMatrix } from '../../shared/value-types.js';
 import type { WorkerClient, WorkerLike } from '../../shared/worker-client.js';
 
 export interface FrameSettings {
   readonly output: OutputSettings;
+  readonly colorMatrix: ColorMatrix;
   readonly gamut: Gamut;
   /** Share of the components, 0 to 1. */
   readonly quality: number;

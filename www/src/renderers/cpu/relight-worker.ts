@@ -29,7 +29,8 @@ function handle(module: CpuModule, photo: number, task: RowRangeCommand): ArrayB
       return Uint32Array.from(relighterOf(module, stored).lightRows).buffer;
     case 'relight': {
       const { light, settings, pixels } = task;
-      const transform = createOutputTransform(module, settings.output, settings.gamut);
+      const { output, colorMatrix, gamut } = settings;
+      const transform = createOutputTransform(module, output, colorMatrix, gamut);
       try {
         const out = new Uint8Array(pixels);
         relighterOf(module, stored).relight(light, transform, settings.quality, out);

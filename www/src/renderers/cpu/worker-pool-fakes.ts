@@ -1,6 +1,7 @@
 /** Workers for tests of the pool. They paint each tile's pixel with the tile's index. */
 
 import assert from 'node:assert/strict';
+import { parseColorMatrix } from '../../photo/metadata.js';
 import {
   START_ID,
   type WatchdogLimits,
@@ -15,7 +16,12 @@ import { WorkerPool } from './worker-pool.js';
 type Request = WorkerRequest<RelightWorkerTask>;
 type Response = WorkerResponse<string, ArrayBuffer>;
 
-export const FRAME: FrameSettings = { output: PLAIN, gamut: 'srgb', quality: 1 };
+export const FRAME: FrameSettings = {
+  output: PLAIN,
+  colorMatrix: parseColorMatrix(undefined),
+  gamut: 'srgb',
+  quality: 1,
+};
 
 /** A short watchdog for tests of silence, and one that slow machines do not trigger. */
 export const SHORT_LIMITS: WatchdogLimits = { intervalMs: 10, maxChecks: 3, maxStartChecks: 3 };

@@ -30,6 +30,7 @@ export async function createWorkerRenderer(
   const { colorSpace } = context.getContextAttributes?.() ?? {};
   const gamut = colorSpace === requestedGamut ? requestedGamut : 'srgb';
   const lights = new LightCache(module, photograph.createLightPlane(module));
+  const { colorMatrix } = photograph;
   let isFreed = false;
   const checkNotFreed = () => {
     if (isFreed) throw photoReleased();
@@ -45,7 +46,8 @@ export async function createWorkerRenderer(
         return await photograph.withWorkers(pool, async (session) => {
           checkNotFreed();
           const { light, ...result } = lights.get(setting);
-          const picture = await session.relight(light, { output, gamut, quality });
+          const settings = { output, colorMatrix, gamut, quality };
+          const picture = await session.relight(light, settings);
           checkNotFreed();
           // All rows in one task, before the next frame reuses their memory.
           for (const { firstRow, rows, pixels } of picture) {
