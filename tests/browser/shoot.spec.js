@@ -85,17 +85,19 @@ class Studio {
     const fault = this.fault(number, attempt);
     if (fault === 'no file') return undefined;
     if (fault === 'camera') return 'the battery is empty';
-    const screenshot = this.screenshots.at(fault === 'late' ? -2 : -1);
+    // The first is of the flood.
+    const shown = { late: -2, flood: 0 }[fault ?? ''] ?? -1;
+    const screenshot = this.screenshots.at(shown);
     writeFileSync(this.path('screen.png'), screenshot ?? '');
     const [above, below] = (query.get('exposure') || '1/15').split('/').map(Number);
     const factor = this.light * (fault === 'dark' ? 0.3 : 1);
     const seconds = (factor * (above ?? 1)) / (below ?? 1);
     const object = [this.path('object'), '--sequence', this.path('session')];
-    const shown = ['--picture', this.path('screen.png'), '--exposure', String(seconds)];
+    const picture = ['--picture', this.path('screen.png'), '--exposure', String(seconds)];
     const args = [
       'photograph',
       ...object,
-      ...shown,
+      ...picture,
       '-o',
       file,
       '--seed',
@@ -161,8 +163,6 @@ test('a session with faults becomes a capture, and what went wrong is photograph
   test.setTimeout(300_000);
   /** @type {Record<number, string>} */
   const faults = {
-    // Shows the flood of the search for the exposure.
-    0: 'late',
     3: 'no file',
     6: 'late',
     [FIRST_GRAY_CODE + 4]: 'truncated',
@@ -172,7 +172,13 @@ test('a session with faults becomes a capture, and what went wrong is photograph
     [FIRST_PATTERN + 5]: 'dark',
     [FIRST_PATTERN + 8]: 'camera',
   };
-  studio.fault = (number, attempt) => (attempt === 1 ? faults[number] : undefined);
+  // Before the session, the dark picture is photographed twice after the flood; if the first shows that, twice more.
+  /** @type {Record<number, string>} */
+  const darkFaults = { 1: 'late', 5: 'flood' };
+  studio.fault = (number, attempt) => {
+    if (number === 0) return darkFaults[attempt];
+    return attempt === 1 ? faults[number] : undefined;
+  };
   studio.light = 2.5;
   const session = await studio.shoot(...EXPOSURES);
   await studio.show(browser, session.url);
@@ -181,6 +187,7 @@ test('a session with faults becomes a capture, and what went wrong is photograph
   // A tenth of the object's own light is too dark, and three times as much saturates.
   expect(text).toContain('exposure 1/60 s');
   for (const part of [
+    'the dark picture has 99.9 % of its light left: photographs wait for 0.10 seconds',
     'the flood is hardly brighter than the dark photograph',
     'wrote no photograph',
     'is not between its neighbours in brightness, as display/0006-ramp-128.png is',
@@ -196,7 +203,9 @@ test('a session with faults becomes a capture, and what went wrong is photograph
   const { attempts } = log.photographs[FIRST_PATTERN + 2];
   expect(attempts).toBe(2);
   // The dark photograph and the plain Gray code were taken again, because others did not fit them.
-  for (const number of [0, FIRST_GRAY_CODE + 10]) expect(studio.attempts.get(number)).toBe(2);
+  expect(studio.attempts.get(0)).toBe(6);
+  expect(studio.attempts.get(FIRST_GRAY_CODE + 10)).toBe(2);
+  expect(log.settle_seconds).toBeCloseTo(0.1);
   expect(log.photographs[FIRST_PATTERN + 1].attempts).toBe(1);
   await expect(studio.page?.locator('#message') ?? fail()).toContainText(
     'All photographs are taken',
@@ -227,7 +236,7 @@ test('a session goes on after an interruption, a reload and a closed page', asyn
   first.program.kill('SIGINT');
   const interrupted = await first.ended;
   expect(interrupted.code).toBe(130);
-  expect(interrupted.text).toMatch(/interrupted: \d+ of 53 photographs are kept/);
+  expect(interrupted.text).toMatch(/interrupted: \d+ of 56 photographs are kept/);
   await studio.page?.context().close();
   const refused = await studio.refusal(...EXPOSURES, '--bin', '2');
   expect(refused).toContain('was begun with another --bin, 1');
@@ -235,9 +244,10 @@ test('a session goes on after an interruption, a reload and a closed page', asyn
   await studio.show(browser, second.url);
   const { code, text } = await second.ended;
   expect(code, text).toBe(0);
-  // Photographs are not taken again, nor is the exposure searched, but where the reload and the interruption came.
+  // Photographs are not taken again, nor are exposure and delay searched, but where the reload and the interruption came.
   expect(text).not.toContain('exposure 1/');
-  const again = [...studio.attempts].filter(([number, count]) => number !== 1 && count > 1);
+  expect(studio.attempts.get(0)).toBe(3);
+  const again = [...studio.attempts].filter(([number, count]) => number > 1 && count > 1);
   expect(again.length).toBeLessThanOrEqual(2);
   ltmExport('check', studio.path('session'), '--strict');
 });

@@ -148,7 +148,7 @@ impl Photographer<'_> {
             let seconds = self.settle.as_secs_f32();
             if doublings == MAX_DOUBLINGS {
                 self.say(&format!(
-                    "warning: {seconds:.1} seconds after the flood, the dark picture still has {:.1} % of its light: the display is slow, or \
+                    "warning: {seconds:.2} seconds after the flood, the dark picture still has {:.1} % of its light: the display is slow, or \
                      the light changes; a longer --settle may help",
                     100.0 * left
                 ));
@@ -156,7 +156,7 @@ impl Photographer<'_> {
             }
             self.settle = (2 * self.settle).max(MIN_SETTLE);
             self.say(&format!(
-                "note: {seconds:.1} seconds after the flood, the dark picture has {:.1} % of its light left: photographs wait for {:.1} \
+                "note: {seconds:.2} seconds after the flood, the dark picture has {:.1} % of its light left: photographs wait for {:.2} \
                  seconds from now on",
                 100.0 * left,
                 self.settle.as_secs_f32()
