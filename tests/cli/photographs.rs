@@ -525,6 +525,79 @@ fn a_gamma_that_is_declared_wrong_is_told() {
     assert!((gamma - 2.2).abs() < 0.1, "{gamma}");
 }
 
+/// Makes grey patterns coloured: the channels of each shot become those of three shots, and so do their photographs.
+fn colour_patterns(capture: &Path, shots: usize) {
+    let shot_of = |l: usize, c: usize| (l + 7 * c) % shots;
+    let names = |kind: &str| -> Vec<PathBuf> {
+        let name = |l: usize| capture.join(format!("{kind}/{l:04}.png"));
+        (0..shots).map(name).collect()
+    };
+    let patterns = names("patterns");
+    let grey: Vec<_> = patterns
+        .iter()
+        .map(|path| image::open(path).unwrap().to_luma8())
+        .collect();
+    for (l, path) in patterns.iter().enumerate() {
+        let (width, height) = grey[l].dimensions();
+        let code = |x, y| Rgb([0, 1, 2].map(|c| grey[shot_of(l, c)].get_pixel(x, y).0[0]));
+        let coloured = image::RgbImage::from_fn(width, height, code);
+        coloured.save(path).unwrap();
+    }
+    let photos = names("photos");
+    let taken: Vec<Photograph> = photos
+        .iter()
+        .map(|path| image::open(path).unwrap().to_rgb16())
+        .collect();
+    for (l, path) in photos.iter().enumerate() {
+        let (width, height) = taken[l].dimensions();
+        let sample = |x, y| Rgb([0, 1, 2].map(|c| taken[shot_of(l, c)].get_pixel(x, y).0[c]));
+        Photograph::from_fn(width, height, sample)
+            .save(path)
+            .unwrap();
+    }
+}
+
+/// Adds a photograph at half the exposure of each shot.
+fn add_half_exposures(capture: &Path) {
+    let path = capture.join("capture.json");
+    let mut manifest: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    let mut shots = Vec::new();
+    for shot in manifest["shots"].as_array().unwrap() {
+        let name = shot["photo"].as_str().unwrap();
+        let mut photo = image::open(capture.join(name)).unwrap().to_rgb16();
+        for sample in photo.iter_mut() {
+            *sample = (BLACK + 0.5 * (f64::from(*sample) - BLACK)).round() as u16;
+        }
+        let half = name.replace(".png", "-half.png");
+        photo.save(capture.join(&half)).unwrap();
+        shots.push(shot.clone());
+        let pattern = &shot["pattern"];
+        shots.push(serde_json::json!({"pattern": pattern, "photo": half, "exposure": 0.5}));
+    }
+    manifest["shots"] = shots.into();
+    std::fs::write(&path, manifest.to_string()).unwrap();
+}
+
+#[test]
+fn a_wrong_gamma_is_told_with_patterns_in_colour_and_with_several_exposures() {
+    let changes: [fn(&Path); 2] = [|capture| colour_patterns(capture, 50), add_half_exposures];
+    for (i, change) in changes.into_iter().enumerate() {
+        let (_folder, [capture, file]) = faulty_capture("stained-glass", "50", "gamma=1.6");
+        change(Path::new(&capture));
+        let recover = ["recover", &capture, "-o", &file, "--json", "--window", "9"];
+        let report = succeed(&recover).stdout;
+        let report: Value = serde_json::from_slice(&report).unwrap();
+        let field = &report["estimated_fields"][0];
+        assert_eq!(field["field"], "light.gamma", "{i}: {report}");
+        let gamma = number(&field["estimated"]);
+        assert!((gamma - 2.2).abs() < 0.1, "{i}: {gamma}");
+        let trusting = succeed(&[&recover[..], &["--force", "--trust", "estimated"]].concat());
+        let trusting: Value = serde_json::from_slice(&trusting.stdout).unwrap();
+        let gain = number(&trusting["expected_snr_db"]) - number(&report["expected_snr_db"]);
+        assert!(gain > 1.0, "{i}: {gain} dB");
+    }
+}
+
 /// Of a window, whose patterns light all pixels nearly equally, only the flood photograph tells them apart.
 #[test]
 fn compressed_highlights_are_told_from_a_display_that_dims() {
