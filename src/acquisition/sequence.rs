@@ -17,6 +17,8 @@ use crate::transport::{CHANNELS, Extent, MAX_SIDE};
 pub const SEQUENCE_NAME: &str = "sequence.json";
 /// Codes of the grey ramp. Black and white are the dark and the flood photograph.
 const RAMP_CODES: [u8; 8] = [16, 32, 64, 96, 128, 160, 192, 224];
+/// Columns or rows from one line to the next: light of a line hardly reaches another.
+const LINE_SPACING: u32 = 8;
 /// Patterns between two reference floods.
 const REFERENCE_INTERVAL: u32 = 10;
 
@@ -42,6 +44,11 @@ pub enum PictureRole {
     },
     /// All elements are lit once more: how far the lamp has drifted.
     Reference,
+    /// Every eighth column or row is lit: how sharply the display shows single elements.
+    Lines {
+        /// `x` for columns.
+        axis: LightPlaneAxis,
+    },
     /// All elements are lit by one primary: the camera's colours.
     Primary {
         /// The primary.
@@ -83,6 +90,14 @@ impl PictureRole {
             Self::Flood | Self::Reference => uniform(u8::MAX),
             Self::Ramp { code } => uniform(*code),
             Self::GrayCode(pattern) => pattern.codes(light),
+            Self::Lines { axis } => {
+                let code = |(u, v): (u32, u32)| {
+                    let n = if *axis == LightPlaneAxis::X { u } else { v };
+                    let is_lit = n % LINE_SPACING == LINE_SPACING / 2;
+                    if is_lit { u8::MAX } else { 0 }
+                };
+                PatternImage::Grey(light.cells().map(code).collect())
+            }
             Self::Primary { primary } => {
                 let codes = Primary::ALL.map(|other| if other == *primary { u8::MAX } else { 0 });
                 PatternImage::Rgb(vec![codes; light.area()])
@@ -204,6 +219,9 @@ impl PatternSequence {
             show(PictureRole::Pattern { pattern }, Some(codes));
         }
         show(PictureRole::Reference, None);
+        for axis in [LightPlaneAxis::X, LightPlaneAxis::Y] {
+            show(PictureRole::Lines { axis }, None);
+        }
         for primary in Primary::ALL {
             show(PictureRole::Primary { primary }, None);
         }
@@ -227,6 +245,7 @@ impl PatternSequence {
             PictureRole::Flood => "photos/flood.png".to_owned(),
             PictureRole::Ramp { code } => format!("photos/ramp-{code:03}.png"),
             PictureRole::Reference => format!("photos/reference-{i:04}.png"),
+            PictureRole::Lines { axis } => format!("photos/lines-{axis}.png"),
             PictureRole::Primary { primary } => format!("photos/{}.png", primary.name()),
             PictureRole::Pattern { .. } => format!("photos/{i:04}.png"),
             PictureRole::GrayCode(pattern) => pattern.shot().photo,
@@ -353,8 +372,10 @@ impl PatternSequence {
             match role {
                 PictureRole::Dark => manifest.dark = Some(photo),
                 PictureRole::Flood => manifest.flood = Some(photo),
-                PictureRole::Ramp { .. } | PictureRole::Reference | PictureRole::Primary { .. } => {
-                }
+                PictureRole::Ramp { .. }
+                | PictureRole::Reference
+                | PictureRole::Lines { .. }
+                | PictureRole::Primary { .. } => {}
                 PictureRole::GrayCode(pattern) => manifest.graycode.push(GrayCodeShot {
                     photo,
                     ..pattern.shot()
@@ -397,7 +418,7 @@ mod tests {
     fn a_sequence_has_calibration_first_and_a_reference_after_every_ten_patterns() {
         let (sequence, drawn) = PatternSequence::draw(&settings());
         // 4 bits of the columns and 3 of the rows, each with its inverse.
-        assert_eq!(sequence.pictures.len(), 2 + 8 + 14 + 25 + 3 + 3);
+        assert_eq!(sequence.pictures.len(), 2 + 8 + 14 + 25 + 3 + 2 + 3);
         assert_eq!(drawn.len(), sequence.pictures.len());
         assert_eq!(sequence.pictures[0].role, PictureRole::Dark);
         let references = sequence.pictures.iter().enumerate();
@@ -408,7 +429,7 @@ mod tests {
             panic!("a random pattern is grey");
         };
         assert_eq!(pattern.iter().filter(|&&c| c == 0 || c == 255).count(), 96);
-        let [.., reference, red, green, blue] = &sequence.pictures[..] else {
+        let [.., reference, _, lines, red, green, blue] = &sequence.pictures[..] else {
             panic!("too few pictures");
         };
         assert_eq!(reference.picture, "display/0051-reference-0002.png");
@@ -418,7 +439,10 @@ mod tests {
             photos,
             ["photos/red.png", "photos/green.png", "photos/blue.png"]
         );
-        assert_eq!(drawn[53], PatternImage::Rgb(vec![[0, 255, 0]; 96]));
+        assert_eq!(drawn[55], PatternImage::Rgb(vec![[0, 255, 0]; 96]));
+        assert_eq!(lines.photo, "photos/lines-y.png");
+        let row_4 = (0..96).map(|m| if m / 12 == 4 { 255 } else { 0 });
+        assert_eq!(drawn[53], PatternImage::Grey(row_4.collect()));
     }
 
     #[test]

@@ -13,6 +13,8 @@ use crate::simulate::{GrayCodePattern, MONITOR_GAMMA};
 const MAX_DARK: f64 = 0.25;
 /// Largest deviation of a reference, and of the sum of a Gray code pair, from the flood.
 const MAX_DEVIATION: f64 = 0.2;
+/// Largest brightness of lines, which cover an eighth of the light plane, relative to the flood's.
+const MAX_LINES: f64 = 0.5;
 /// Displays emit between these powers of the code, as a share of the largest, give or take the tolerance.
 const RAMP_EXPONENTS: [f64; 2] = [3.5, 0.9];
 const RAMP_TOLERANCE: f64 = 0.05;
@@ -35,8 +37,8 @@ pub enum PairingFault {
     NotDark,
     /// It is not as bright as the flood photograph: its brightness relative to that.
     NotLit(f64),
-    /// It is brighter than the flood photograph: its brightness relative to that.
-    BrighterThanFlood(f64),
+    /// It is brighter than it can be: its brightness relative to the flood photograph.
+    TooBright(f64),
     /// It is darker than the photograph of a lower code.
     NotRising,
     /// It and the photograph of the inverse do not add up to the flood photograph: by this mean deviation, relative to that.
@@ -126,9 +128,12 @@ impl SequenceBrightness {
                 PictureRole::Reference if (relative(photo) - 1.0).abs() > MAX_DEVIATION => {
                     faults.push((photo, PairingFault::NotLit(relative(photo))));
                 }
+                PictureRole::Lines { .. } if relative(photo) > MAX_LINES => {
+                    faults.push((photo, PairingFault::TooBright(relative(photo))));
+                }
                 // It may be nearly dark: there is glass that lets no blue light through.
                 PictureRole::Primary { .. } if relative(photo) > 1.0 + MAX_DEVIATION => {
-                    faults.push((photo, PairingFault::BrighterThanFlood(relative(photo))));
+                    faults.push((photo, PairingFault::TooBright(relative(photo))));
                 }
                 PictureRole::Ramp { code } => {
                     let (code, step) = (f64::from(*code) / 255.0, relative(photo));

@@ -236,7 +236,7 @@ test('a session goes on after an interruption, a reload and a closed page', asyn
   first.program.kill('SIGINT');
   const interrupted = await first.ended;
   expect(interrupted.code).toBe(130);
-  expect(interrupted.text).toMatch(/interrupted: \d+ of 56 photographs are kept/);
+  expect(interrupted.text).toMatch(/interrupted: \d+ of 58 photographs are kept/);
   await studio.page?.context().close();
   const refused = await studio.refusal(...EXPOSURES, '--bin', '2');
   expect(refused).toContain('was begun with another --bin, 1');

@@ -66,7 +66,7 @@ fn photographs_that_do_not_fit_the_sequence_are_refused_by_name() {
     fs::rename(session.photo(14), &hidden).unwrap();
     let error = session.refusal();
     assert!(
-        error.contains("there are 85 photographs of 86 pictures"),
+        error.contains("there are 87 photographs of 88 pictures"),
         "{error}"
     );
     assert!(
@@ -159,7 +159,7 @@ fn wrong_input_is_named_with_its_remedy() {
     );
     let raw = photo.with_extension("CR2");
     fs::rename(&photo, &raw).unwrap();
-    let names = (0..86).map(|i| {
+    let names = (0..88).map(|i| {
         if i == 3 {
             raw.clone()
         } else {
@@ -194,7 +194,7 @@ fn wrong_input_is_named_with_its_remedy() {
 fn photographs_of_other_types_are_read() {
     let session = Session::new();
     // 8 bits with the curve of sRGB, of which some are grey, and some have an alpha channel, as TIFF.
-    for i in 0..86 {
+    for i in 0..88 {
         let photo = session.photo(i);
         let linear = image::open(&photo).unwrap().into_rgb16();
         let encoded = image::RgbImage::from_fn(48, 48, |x, y| {
@@ -260,6 +260,40 @@ fn photographs_of_other_types_are_read() {
         (middle[1].as_f64().unwrap() - 0.2195).abs() < 0.01,
         "{middle}"
     );
+}
+
+/// The tray of cookies hardly scatters.
+#[test]
+fn a_display_that_blurs_single_lines_is_noted() {
+    for (fault, is_noted) in [(None, false), (Some("smooth=0.5"), true)] {
+        let folder = TempDir::new().unwrap();
+        let [object, sequence, photos] = ["object", "sequence", "photos"]
+            .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+        let light = ["--light", "24x24", "--patterns", "4"];
+        let simulate = ["simulate", "cookies", "-o", &object, "--camera", "48x48"];
+        succeed(&[&simulate[..], &light].concat());
+        let patterns = ["patterns", "-o", &sequence, "--screen", "100x100"];
+        succeed(&[&patterns[..], &light].concat());
+        let photograph = [
+            "photograph",
+            &object,
+            "--sequence",
+            &sequence,
+            "-o",
+            &photos,
+        ];
+        let fault: Vec<&str> = fault.iter().flat_map(|fault| ["--fault", fault]).collect();
+        succeed(&[&photograph[..], &fault].concat());
+        let levels = ["--black", "512", "--white", "60000"];
+        let assembled =
+            succeed(&[&["assemble", &sequence, "--photos", &photos], &levels[..]].concat());
+        let text = stderr_text(&assembled);
+        assert_eq!(
+            text.contains("note: lines of one light element"),
+            is_noted,
+            "{text}"
+        );
+    }
 }
 
 #[test]

@@ -49,10 +49,10 @@ fn a_session_of_another_program_is_imported_calibrated_and_recovered() {
     let [capture, file] = ["capture", "file.ltm"].map(|name| session.text(name));
     let from = ["--patterns", &pictures, "--photos", &photos];
     let imported = succeed(&[&["import", "-o", &capture][..], &from].concat());
-    // Eight grey levels, 40 patterns, 20 bits and three colours are shots; floods that are repeated are not.
+    // Eight grey levels, 40 patterns, 20 bits, lines along two axes and three colours are shots; floods that are repeated are not.
     let summary = stderr_text(&imported);
     assert!(
-        summary.contains("71 shots of 32x32 light elements of 4x4 display pixels"),
+        summary.contains("73 shots of 32x32 light elements of 4x4 display pixels"),
         "{summary}"
     );
     assert!(summary.contains("20 photographs of Gray code, a dark frame, a flood photograph"));

@@ -16,7 +16,7 @@ use crate::session::{Session, stderr_text, succeed};
 type Photo = ImageBuffer<Rgb<u16>, Vec<u16>>;
 
 /// Pictures of a session, each with a photograph.
-const PICTURES: usize = 86;
+const PICTURES: usize = 88;
 const SIZE: [u32; 2] = [48, 48];
 /// Levels of the simulated camera.
 const BLACK: f64 = 512.0;

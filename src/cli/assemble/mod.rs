@@ -3,6 +3,7 @@
 mod color_matrix;
 mod develop_all;
 mod level_warnings;
+mod line_sharpness;
 mod photograph_file;
 mod photograph_list;
 mod rotation;

@@ -9,6 +9,7 @@ use super::color_matrix::session_color_matrix;
 use super::develop_all::develop_all;
 use super::fit_gray_code;
 use super::level_warnings::{PhotographLevels, warn_of_clipping};
+use super::line_sharpness::note_line_sharpness;
 use super::photograph_file::DevelopSettings;
 use crate::acquisition::{PairingFault, PatternSequence, PictureRole, SequenceBrightness};
 use crate::capture::{MANIFEST_NAME, Manifest, ManifestCamera};
@@ -75,6 +76,7 @@ impl Session {
         self.note_exposure();
         let paths = self.paths.iter().map(PathBuf::as_path);
         warn_of_clipping(self.levels.iter().zip(paths));
+        note_line_sharpness(self);
         let response = self.display_response();
         let camera = ManifestCamera {
             color_matrix: session_color_matrix(self),
@@ -256,7 +258,7 @@ pub fn fault_text(path: &str, picture: &str, fault: PairingFault) -> String {
         PairingFault::NotLit(relative) => format!(
             "{path} is {relative:.2} times as bright as the flood photograph, and should be equally bright, as {picture} is"
         ),
-        PairingFault::BrighterThanFlood(relative) => format!(
+        PairingFault::TooBright(relative) => format!(
             "{path} is {relative:.2} times as bright as the flood photograph, and should be darker, as {picture} is"
         ),
         PairingFault::NotRising => {
