@@ -129,7 +129,11 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TileTransportFunctions>) {
 
 fn prepare(measurements: &Measurements, method: Method) -> PreparedRecovery {
     let window = Window::new(WINDOW).unwrap();
-    let settings = RecoverySettings { method, window };
+    let settings = RecoverySettings {
+        method,
+        window,
+        is_registered: true,
+    };
     let preparation = PreparedRecovery::prepare(measurements, settings, &SequentialExecutor);
     pollster::block_on(preparation).unwrap()
 }

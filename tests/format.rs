@@ -164,6 +164,11 @@ fn metadata() -> Metadata {
         writer: "test".to_owned(),
         method: "nnls".to_owned(),
         shots_used: vec![0, 2, 5],
+        color_matrix: Some([
+            [1.9, -0.7, -0.0001],
+            [-0.2, 1000.0, -1000.0],
+            [0.0, -0.6, 1.6],
+        ]),
         ..Metadata::default()
     }
 }

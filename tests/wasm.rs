@@ -573,11 +573,13 @@ async fn invalid_lights_and_exposures_are_refused() {
         let foreign = WebLight::builtin(&other, "flood").unwrap();
         assert_eq!(coded(relighter.render(&foreign, 1.0)), "light-size");
         let own = WebLight::builtin(&one, "flood").unwrap();
-        for exposure in [f64::NAN, f64::INFINITY, -1.0] {
+        for exposure in [f64::NAN, f64::INFINITY, 1e39] {
             assert_eq!(coded(relighter.render(&own, exposure)), "light-value");
         }
         relighter.render(&own, 1.0).unwrap();
     }
+    let short = WebOutputTransform::new(&[1.0; 8], "clip", "srgb");
+    assert_eq!(coded(short.map(|_| ())), "light-value");
 }
 
 #[wasm_bindgen_test]

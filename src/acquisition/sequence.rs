@@ -92,9 +92,16 @@ impl PictureRole {
             Self::GrayCode(pattern) => pattern.codes(light),
             Self::Lines { axis } => {
                 let code = |(u, v): (u32, u32)| {
-                    let n = if *axis == LightPlaneAxis::X { u } else { v };
-                    let is_lit = n % LINE_SPACING == LINE_SPACING / 2;
-                    if is_lit { u8::MAX } else { 0 }
+                    let (n, side) = match axis {
+                        LightPlaneAxis::X => (u, light.width),
+                        LightPlaneAxis::Y => (v, light.height),
+                    };
+                    let spacing = LINE_SPACING.min(side);
+                    if n % spacing == spacing / 2 {
+                        u8::MAX
+                    } else {
+                        0
+                    }
                 };
                 PatternImage::Grey(light.cells().map(code).collect())
             }

@@ -4,18 +4,19 @@
 //! the columns of `A` are the camera's colours of each primary. The colour matrix is `A⁻¹`: it separates what the channels of a
 //! camera mix.
 
-use crate::transport::{CHANNELS, ColorMatrix};
+use crate::transport::{CHANNELS, ColorMatrix, inverse_color_matrix};
 
-/// Three rows of three numbers.
-pub type Matrix3 = [[f64; CHANNELS]; CHANNELS];
-
-/// Determinant of the primaries' directions, below which the camera hardly tells them apart.
-const MIN_DETERMINANT: f64 = 0.05;
+/// Least light of a primary, as a share of that of all three.
+const MIN_LIGHT_SHARE: f64 = 0.02;
+/// Least length of a primary's column, relative to the longest, at which it is a plausible part of white.
+const MIN_LENGTH_RATIO: f64 = 0.1;
+/// Largest factor of a matrix that is plausible: a camera that needs more hardly tells the primaries apart.
+const MAX_FACTOR: f64 = 20.0;
 
 /// The camera's colours of the primaries of sRGB, as columns, from a matrix from its RGB to linear sRGB, of any unit. `None` if that
 /// has no inverse.
-pub fn primaries_from_matrix(camera_to_srgb: &Matrix3) -> Option<Matrix3> {
-    inverse(camera_to_srgb, f64::MIN_POSITIVE)
+pub fn primaries_from_matrix(camera_to_srgb: &ColorMatrix) -> Option<ColorMatrix> {
+    inverse_color_matrix(camera_to_srgb)
 }
 
 /// The camera's colours of the primaries, as columns, from the light of its photographs of a display that shows each: `lights[k]`
@@ -23,69 +24,67 @@ pub fn primaries_from_matrix(camera_to_srgb: &Matrix3) -> Option<Matrix3> {
 ///
 /// An object changes the brightness of a primary and hardly its direction in the camera's space, as primaries are narrow. The
 /// columns' lengths are therefore chosen so that they sum to `white`, the camera's colour of white light. `None` if the camera
-/// does not tell the primaries apart, if they are exchanged, or if white is none of their mixtures.
+/// does not tell the primaries apart, if hardly any light of one comes through the object, if two photographs are exchanged, or if
+/// white is none of the primaries' mixtures.
 pub fn primaries_from_photographs(
     lights: &[[f64; CHANNELS]; CHANNELS],
     white: [f64; CHANNELS],
-) -> Option<Matrix3> {
-    let length = |light: &[f64; CHANNELS]| light.iter().map(|y| y * y).sum::<f64>().sqrt();
+) -> Option<ColorMatrix> {
+    let brightness = lights.map(|light| light.iter().sum::<f64>());
+    let total: f64 = brightness.iter().sum();
+    // Drift and stray light have another direction than the primary.
+    let is_bright = |k: usize| brightness[k] > MIN_LIGHT_SHARE * total;
     // Relative to white, a primary is brightest in its own channel.
-    let is_own = |k: usize| {
+    let is_brightest_in_own_channel = |k: usize| {
         let share = |c: usize| lights[k][c] / white[c];
         (0..CHANNELS).all(|c| share(k) >= share(c))
     };
-    if !(0..CHANNELS).all(is_own) {
+    if !(0..CHANNELS).all(|k| is_bright(k) && is_brightest_in_own_channel(k)) {
         return None;
     }
+    let length = |light: &[f64; CHANNELS]| light.iter().map(|y| y * y).sum::<f64>().sqrt();
     let directions = lights.map(|light| light.map(|y| y / length(&light)));
-    let columns: Matrix3 = std::array::from_fn(|c| directions.map(|direction| direction[c]));
-    let inverse = inverse(&columns, MIN_DETERMINANT)?;
+    let columns: ColorMatrix = std::array::from_fn(|c| directions.map(|direction| direction[c]));
+    let inverse = inverse_color_matrix(&columns)?;
     let lengths = inverse.map(|row| (0..CHANNELS).map(|c| row[c] * white[c]).sum::<f64>());
+    let longest = lengths.iter().copied().fold(0.0, f64::max);
     lengths
         .iter()
-        .all(|length| *length > 0.0)
+        .all(|length| *length > MIN_LENGTH_RATIO * longest)
         .then(|| columns.map(|row| std::array::from_fn(|k| row[k] * lengths[k])))
 }
 
 /// The camera's colour of white light from its colours of the primaries.
-pub fn white_of(primaries: &Matrix3) -> [f64; CHANNELS] {
+pub fn white_of(primaries: &ColorMatrix) -> [f64; CHANNELS] {
     primaries.map(|row| row.iter().sum())
 }
 
 /// The matrix from the camera's RGB to linear sRGB. White at which the camera's most sensitive channel is 1 becomes 1. `None` if
-/// the primaries are not independent.
-pub fn color_matrix(primaries: &Matrix3) -> Option<ColorMatrix> {
+/// the primaries are hardly independent.
+pub fn color_matrix(primaries: &ColorMatrix) -> Option<ColorMatrix> {
     let most_sensitive = white_of(primaries).into_iter().fold(0.0, f64::max);
-    let inverse = inverse(primaries, f64::MIN_POSITIVE)?;
+    let inverse = inverse_color_matrix(primaries)?;
     // Four decimals are more than cameras of one model have in common.
     let rounded = |factor: f64| (factor * most_sensitive * 1e4).round() / 1e4;
-    Some(inverse.map(|row| row.map(rounded)))
-}
-
-/// The inverse by cofactors; `None` if the determinant's magnitude is not above `least`.
-fn inverse(matrix: &Matrix3, least: f64) -> Option<Matrix3> {
-    let cofactor = |row: usize, column: usize| {
-        let [r0, r1] = [1, 2].map(|i| (row + i) % CHANNELS);
-        let [c0, c1] = [1, 2].map(|i| (column + i) % CHANNELS);
-        matrix[r0][c0] * matrix[r1][c1] - matrix[r0][c1] * matrix[r1][c0]
-    };
-    let determinant: f64 = (0..CHANNELS).map(|c| matrix[0][c] * cofactor(0, c)).sum();
-    let is_regular = determinant.abs() > least;
-    is_regular
-        .then(|| std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i) / determinant)))
+    let matrix = inverse.map(|row| row.map(rounded));
+    let is_plausible = matrix
+        .as_flattened()
+        .iter()
+        .all(|factor| factor.abs() <= MAX_FACTOR);
+    is_plausible.then_some(matrix)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     /// From the RGB of a camera to linear sRGB.
-    const CAMERA: Matrix3 = [
+    const CAMERA: ColorMatrix = [
         [3.7396, -0.5693, -0.1845],
         [-0.3644, 1.5270, -0.5174],
         [0.0479, -0.4141, 1.5610],
     ];
 
-    fn primaries() -> Matrix3 {
+    fn primaries() -> ColorMatrix {
         primaries_from_matrix(&CAMERA).unwrap()
     }
 
@@ -140,6 +139,14 @@ mod tests {
         let exchanged = [[0.1, 0.8, 0.1], [0.8, 0.1, 0.1], [0.1, 0.1, 0.8]];
         assert_eq!(
             primaries_from_photographs(&exchanged, [1.0; CHANNELS]),
+            None
+        );
+        // Hardly any blue comes through, so that stray light of a thousandth decides.
+        let mut weak: [[f64; CHANNELS]; CHANNELS] =
+            std::array::from_fn(|k| primaries().map(|row| row[k] * [0.8, 0.6, 0.002][k]));
+        weak[2].iter_mut().for_each(|y| *y += 0.001);
+        assert_eq!(
+            primaries_from_photographs(&weak, white_of(&primaries())),
             None
         );
         let dark = [[0.0; CHANNELS]; CHANNELS];

@@ -12,7 +12,7 @@ mod graycode_fit;
 
 #[cfg(not(target_arch = "wasm32"))]
 pub use camera_colors::{
-    Matrix3, color_matrix, primaries_from_matrix, primaries_from_photographs, white_of,
+    color_matrix, primaries_from_matrix, primaries_from_photographs, white_of,
 };
 pub use gray_code_quality::GrayCodeQuality;
 pub use graycode::{BitPair, CalibrationError, GrayCodePhotos, LightPlaneAxis};

@@ -351,14 +351,11 @@ impl Manifest {
             let field = format!("camera.saturation[{c}]");
             check(check_range(valid, &field, saturation, &allowed));
         }
-        for factor in camera
-            .color_matrix
-            .as_ref()
-            .map_or(&[][..], |m| m.as_flattened())
-        {
+        for (i, factor) in camera.color_matrix.iter().flatten().flatten().enumerate() {
             let valid = factor.abs() <= MAX_COLOR_FACTOR;
-            let allowed = format!("at most {MAX_COLOR_FACTOR}");
-            check(check_range(valid, "camera.color_matrix", factor, &allowed));
+            let field = format!("camera.color_matrix[{}][{}]", i / CHANNELS, i % CHANNELS);
+            let allowed = format!("between -{MAX_COLOR_FACTOR} and {MAX_COLOR_FACTOR}");
+            check(check_range(valid, &field, factor, &allowed));
         }
         check(match camera.response {
             CameraResponse::Linear | CameraResponse::Srgb => Ok(()),

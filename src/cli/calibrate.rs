@@ -39,7 +39,8 @@ pub fn is_implausible(fit: &GrayCodeFit) -> bool {
     (fit.residual).is_some_and(|residual| residual.median > MAX_RESIDUAL)
 }
 
-/// Find the correspondence of a capture from its Gray code, report how well it fits, and write it into capture.json
+/// Find the correspondence of a capture from its Gray code, report how well it fits, and write it into capture.json; report noise and
+/// drift of the photographs
 #[derive(Debug, Args)]
 pub struct CalibrateArgs {
     /// Capture folder
@@ -164,6 +165,7 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     drop(spinner);
     let gains = examined.shot_reports.iter();
     let gains: Vec<(usize, f64)> = gains
+        .filter(|shot| shot.verdict == Some("used"))
         .filter_map(|shot| Some((shot.shot, shot.gain?)))
         .collect();
     let report = CalibrationReport {
@@ -230,12 +232,19 @@ fn print(fit: &GrayCodeFit, report: &CalibrationReport, camera: &ManifestCamera)
             &format!("{red:.2}, {green:.2} and {blue:.2} % of white, at white"),
         )?;
     }
-    if let Some(ExposureStability { drift, jitter }) = &report.exposure {
-        let (drift, jitter) = (100.0 * drift, 100.0 * jitter);
-        line(
-            "exposure",
-            &format!("drifts by {drift:+.1} % over the session, and jitters by {jitter:.1} %"),
-        )?;
+    match &report.exposure {
+        None => {}
+        // No gain differs from 1 by more than chance.
+        Some(ExposureStability { drift, jitter }) if *drift == 0.0 && *jitter == 0.0 => {
+            line("exposure", "steady, as far as the noise shows")?;
+        }
+        Some(ExposureStability { drift, jitter }) => {
+            let (drift, jitter) = (100.0 * drift, 100.0 * jitter);
+            line(
+                "exposure",
+                &format!("drifts by {drift:+.1} % over the session, and jitters by {jitter:.1} %"),
+            )?;
+        }
     }
     Ok(())
 }

@@ -17,7 +17,7 @@ use crate::relight::cpu::CpuRelighter;
 use crate::relight::{
     BuiltinLight, Light, OutputTransform, TorchSpot, area_resample, reference, srgb,
 };
-use crate::transport::Extent;
+use crate::transport::{Extent, light_color_matrix};
 
 /// Relight an object and write the picture as an 8-bit sRGB PNG
 #[derive(Debug, Args)]
@@ -87,7 +87,7 @@ pub fn run(args: &RelightArgs) -> Result<()> {
         eprintln!("note: {complete} of {scans} scans are complete in these {bytes} bytes");
     }
     let geometry = &file.index.header.geometry;
-    let light = match (args.at, args.time) {
+    let mut light = match (args.at, args.time) {
         (Some([x, y]), _) => Light::torch(geometry.light, TorchSpot::behind(geometry, x, y)),
         (None, Some(seconds)) => Light::fire(geometry.light, seconds),
         (None, None) => load_light(&args.light, geometry.light)?,
@@ -95,6 +95,9 @@ pub fn run(args: &RelightArgs) -> Result<()> {
     let mut transform = OutputTransform::srgb(args.exposure);
     if let Some(color_matrix) = file.index.metadata.read()?.color_matrix {
         transform = transform.with_color_matrix(&color_matrix);
+        if let Some(matrix) = light_color_matrix(&color_matrix) {
+            light = light.converted(&matrix);
+        }
     }
     let picture = match args.backend {
         RelightImplementation::Cpu => {

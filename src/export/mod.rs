@@ -17,8 +17,8 @@ pub use encoding::{FileQuality, encode_file, file_geometry, file_tile};
 pub use memory_plan::{MemoryPlan, TooLittleMemory, spread_tile_rows};
 pub use metadata::{Provenance, metadata};
 pub use preparation::{
-    MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation, implausibly_saturated, prepare,
-    saturated_percent,
+    ExportSettings, MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation,
+    implausibly_saturated, prepare, saturated_percent,
 };
 pub use shot_selection::{TooFewShots, select_shots};
 pub use tile_record::{decode as decode_tile, encode as encode_tile};

@@ -70,24 +70,38 @@ fn has_one_exposure(measurements: &Measurements) -> bool {
     full_scale.iter().all(|value| *value == full_scale[0])
 }
 
-/// Prepares a recovery by `method`, in `window` or in one that is estimated.
+/// How a recovery is prepared.
+#[derive(Clone, Copy, Debug)]
+pub struct ExportSettings {
+    /// How light transport functions are recovered.
+    pub method: Method,
+    /// The window; `None` to estimate it.
+    pub window: Option<Window>,
+    /// Whether shifts between photographs are estimated and corrected.
+    pub is_registered: bool,
+}
+
+/// Prepares a recovery.
 ///
 /// # Errors
 /// Those of [`PreparedRecovery::prepare`], and [`RecoverError::IndistinctPhotographs`].
 pub async fn prepare(
     measurements: &Measurements,
-    method: Method,
-    window: Option<Window>,
+    settings: ExportSettings,
     executor: &impl Executor,
 ) -> Result<PreparedExport, RecoverError> {
-    let (window, band) = match window {
+    let (window, band) = match settings.window {
         Some(window) => (window, None),
         None => {
             let estimate = WindowSizeEstimate::from_measurements(measurements, executor).await?;
             (estimate.window, Some(estimate.band))
         }
     };
-    let settings = RecoverySettings { method, window };
+    let settings = RecoverySettings {
+        method: settings.method,
+        window,
+        is_registered: settings.is_registered,
+    };
     let recovery = PreparedRecovery::prepare(measurements, settings, executor).await?;
     match recovery.holdout_validation() {
         Some(validation) if !validation.has_signal() => Err(RecoverError::IndistinctPhotographs),

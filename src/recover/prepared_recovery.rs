@@ -62,6 +62,8 @@ pub struct RecoverySettings {
     pub method: Method,
     /// The light elements around a pixel's correspondence that may light it.
     pub window: Window,
+    /// Whether shifts between photographs are estimated and corrected.
+    pub is_registered: bool,
 }
 
 /// A recovery that is ready to run. All that depends on the measurements as a whole has been learned or chosen; tiles
@@ -109,7 +111,7 @@ impl PreparedRecovery {
             executor,
         };
         let mut mean = mean_function::mean_function(&preparation).await?;
-        let photometry = photometry::estimate(&preparation, &mean).await?;
+        let photometry = photometry::estimate(&preparation, &mean, settings.is_registered).await?;
         let is_left_out = |l: usize| photometry.faults.iter().any(|fault| fault.0 == l);
         let split = HoldoutSplit::without(&measurements.patterns, is_left_out);
         let input = photometry.resampling_input(measurements, &geometry, &split.all);

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::resample::AreaResampler;
 use super::{fire, platform_math};
-use crate::transport::{Extent, Geometry, LightPosition};
+use crate::transport::{ColorMatrix, Extent, Geometry, LightPosition, convert_color};
 
 /// The linear emission of every light element, 0 to 1 at full brightness.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,6 +104,22 @@ impl BuiltinLight {
             }
             Self::Spectrum => Light::from_fn(extent, |p| rainbow(p.u / w)),
             Self::Fire => Light::fire(extent, 0.0),
+        }
+    }
+}
+
+impl Light {
+    /// The light with each element's RGB multiplied by `matrix`; negative emissions become 0. See
+    /// [`light_color_matrix`](crate::transport::light_color_matrix).
+    pub fn converted(&self, matrix: &ColorMatrix) -> Self {
+        let matrix = matrix.map(|row| row.map(|factor| factor as f32));
+        let convert = |&[r, g, b, rest]: &[f32; 4]| {
+            let [r, g, b] = convert_color(&matrix, [r, g, b]).map(|emission| emission.max(0.0));
+            [r, g, b, rest]
+        };
+        Self {
+            extent: self.extent,
+            elements: self.elements.iter().map(convert).collect(),
         }
     }
 }

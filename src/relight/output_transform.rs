@@ -52,7 +52,8 @@ impl OutputTransform {
         }
     }
 
-    /// The same for a photograph with this colour matrix.
+    /// The same for a photograph with this colour matrix. Coloured lights need one of their own, too:
+    /// [`light_color_matrix`](crate::transport::light_color_matrix).
     pub fn with_color_matrix(self, color_matrix: &ColorMatrix) -> Self {
         Self {
             matrix: product(

@@ -63,6 +63,7 @@ pub(super) fn measure_accuracy(
     let settings = RecoverySettings {
         method,
         window: known.geometry().window,
+        is_registered: true,
     };
     let preparation = PreparedRecovery::prepare(measurements, settings, executor);
     let recovery = pollster::block_on(preparation)?;

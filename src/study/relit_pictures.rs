@@ -153,6 +153,7 @@ fn pictures(
     let settings = RecoverySettings {
         method: DEFAULT_METHOD,
         window: known.geometry().window,
+        is_registered: true,
     };
     let preparation = PreparedRecovery::prepare(measurements, settings, executor);
     let recovery = pollster::block_on(preparation)?;

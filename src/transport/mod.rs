@@ -24,7 +24,10 @@ mod singular_values;
 mod snr;
 mod tile;
 
-pub use color_matrix::{ColorMatrix, MAX_COLOR_FACTOR, convert_color, is_valid_color_matrix};
+pub use color_matrix::{
+    ColorMatrix, MAX_COLOR_FACTOR, convert_color, inverse_color_matrix, is_valid_color_matrix,
+    light_color_matrix,
+};
 pub use correspondence::Correspondence;
 pub use displacement_grid::{DisplacementGrid, SharedGrid};
 pub use float_tile::{Basis, FloatTile, TileTransportFunctions};

@@ -59,6 +59,11 @@ fn a_session_of_another_program_is_imported_calibrated_and_recovered() {
     let report = json(&succeed(&["calibrate", &capture, "--json"]));
     assert!(report["decoded"].as_f64().unwrap() > 0.6, "{report}");
     assert_eq!(report["largest_displacement"], 0.0);
+    let noise = report["noise"]["floor"][0].as_f64().unwrap();
+    assert!(noise > 0.0 && noise < 1e-4, "{report}");
+    let [drift, jitter] =
+        ["drift", "jitter"].map(|name| report["exposure"][name].as_f64().unwrap());
+    assert!(drift.abs() < 0.01 && jitter < 0.01, "{report}");
     let affine = &manifest(&capture)["correspondence"]["affine"];
     assert!(
         (affine[0][0].as_f64().unwrap() - 32.0 / 48.0).abs() < 0.01,

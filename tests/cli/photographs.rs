@@ -341,6 +341,13 @@ fn a_camera_that_trembles_is_followed_and_warned_of() {
         "{codes:?}"
     );
     assert!(!codes.contains(&&Value::from("low-snr")), "{codes:?}");
+
+    let output = capture.recover(&["--no-register", "--force"]);
+    let unregistered: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let table = unregistered["photograph_table"].as_array().unwrap();
+    assert!(table.iter().all(|photo| photo["shift"][0] == 0.0));
+    let [with, without] = [&report, &unregistered].map(|report| number(&report["expected_snr_db"]));
+    assert!(with > without + 1.0, "{with} {without}");
 }
 
 /// With 11 light elements and more, windows share covariances.

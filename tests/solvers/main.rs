@@ -114,7 +114,11 @@ fn regions(method: Method, geometry: &Geometry) -> Vec<TileRect> {
 /// Recovers by `method` and returns the error against the true functions, inside the method's window.
 fn recover(measurements: &Measurements, method: Method, truth: &[[f64; 3]]) -> SnrAccumulator {
     let window = window(method);
-    let settings = RecoverySettings { method, window };
+    let settings = RecoverySettings {
+        method,
+        window,
+        is_registered: true,
+    };
     let preparation = PreparedRecovery::prepare(measurements, settings, &SequentialExecutor);
     let recovery = pollster::block_on(preparation).unwrap();
     let geometry = recovery.geometry();

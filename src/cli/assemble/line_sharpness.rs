@@ -1,6 +1,6 @@
 //! How sharply a session's photographs of lines show single light elements.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 use super::session::Session;
 use crate::acquisition::{PictureRole, luminance};
@@ -19,9 +19,10 @@ const MIN_LINE_BRIGHTNESS: f32 = 0.85;
 pub fn note_line_sharpness(session: &Session) {
     match line_brightness(session) {
         Ok(Some(brightness)) if brightness < MIN_LINE_BRIGHTNESS => eprintln!(
-            "note: lines of one light element reach {:.0} % of the flood's brightness in the sharpest camera pixels: either the object scatters \
-             light over an element or more everywhere, or the display is blurred, by smooth scaling for instance, or the picture is out of \
-             focus. Only scattering belongs into the light transport",
+            "note: lines of one light element reach {:.0} % of the flood's brightness in the sharpest camera pixels: the object scatters light \
+             over an element or more everywhere, or camera pixels are larger than half an element (--bin), or the display is blurred, by smooth \
+             scaling for instance, or the picture is out of focus. A blurred display would be part of the light transport: make sure that \
+             a bare part of it shows sharp lines",
             100.0 * brightness
         ),
         Ok(_) => {}
@@ -32,12 +33,13 @@ pub fn note_line_sharpness(session: &Session) {
 /// Brightness of single lines in the sharpest camera pixels, relative to the flood, along the axis where it is less; `None` if the
 /// session has no photographs of lines.
 fn line_brightness(session: &Session) -> Result<Option<f32>> {
-    let photo = |role: PictureRole| session.photos_of(|other| *other == role).first().copied();
-    let lines =
-        [LightPlaneAxis::X, LightPlaneAxis::Y].map(|axis| photo(PictureRole::Lines { axis }));
-    let (Some(dark), Some(flood), [Some(columns), Some(rows)]) =
-        (photo(PictureRole::Dark), photo(PictureRole::Flood), lines)
-    else {
+    let lines = [LightPlaneAxis::X, LightPlaneAxis::Y];
+    let lines = lines.map(|axis| session.photo_of(&PictureRole::Lines { axis }));
+    let dark = session.photo_of(&PictureRole::Dark);
+    // The last flood is of the same time.
+    let flood = session.last_photo_of(&PictureRole::Reference);
+    let flood = flood.or(session.photo_of(&PictureRole::Flood));
+    let (Some(dark), Some(flood), [Some(columns), Some(rows)]) = (dark, flood, lines) else {
         return Ok(None);
     };
     let dark = luminance_of(session, dark)?;
@@ -64,11 +66,7 @@ fn line_brightness(session: &Session) -> Result<Option<f32>> {
 
 /// Mean measurement of the channels of each pixel of a developed photograph.
 fn luminance_of(session: &Session, photo: usize) -> Result<Vec<f32>> {
-    let path = session
-        .developed
-        .join(&session.sequence.pictures[photo].photo);
-    let picture = image::open(&path).with_context(|| path.display().to_string())?;
-    let codes: Vec<_> = picture.into_rgb16().pixels().map(|pixel| pixel.0).collect();
+    let codes = session.developed_codes(photo)?;
     let camera = &session.camera;
     Ok(luminance(&codes, camera.black, camera.white))
 }

@@ -15,6 +15,7 @@ use crate::acquisition::{PairingFault, PatternSequence, PictureRole, SequenceBri
 use crate::capture::{MANIFEST_NAME, Manifest, ManifestCamera};
 use crate::cli::advice::error_with_remedy;
 use crate::cli::process_resources::InterruptibleCores;
+use crate::transport::CHANNELS;
 
 /// Folders that photographs are written into.
 pub const FOLDERS: [&str; 2] = ["photos", "graycode"];
@@ -163,8 +164,26 @@ impl Session {
         self.sequence.pictures[i].picture.clone()
     }
 
+    /// The first photograph of a role, by its number.
+    pub fn photo_of(&self, role: &PictureRole) -> Option<usize> {
+        self.sequence.position(role)
+    }
+
+    /// The last photograph of a role, by its number.
+    pub fn last_photo_of(&self, role: &PictureRole) -> Option<usize> {
+        let mut pictures = self.sequence.pictures.iter();
+        pictures.rposition(|picture| picture.role == *role)
+    }
+
+    /// The codes of a developed photograph, `[N]`.
+    pub fn developed_codes(&self, photo: usize) -> Result<Vec<[u16; CHANNELS]>> {
+        let path = self.developed.join(&self.sequence.pictures[photo].photo);
+        let picture = image::open(&path).with_context(|| path.display().to_string())?;
+        Ok(picture.into_rgb16().pixels().map(|pixel| pixel.0).collect())
+    }
+
     /// Photographs of a role, by their numbers.
-    pub fn photos_of(&self, is_of_role: impl Fn(&PictureRole) -> bool) -> Vec<usize> {
+    fn photos_of(&self, is_of_role: impl Fn(&PictureRole) -> bool) -> Vec<usize> {
         let pictures = self.sequence.pictures.iter().enumerate();
         let found = pictures.filter(|(_, picture)| is_of_role(&picture.role));
         found.map(|(i, _)| i).collect()
@@ -213,8 +232,8 @@ impl Session {
     /// Pairs of code and emission that the ramp shows; `None` if they do not rise.
     pub fn display_response(&self) -> Option<Vec<[f64; 2]>> {
         let thumbnail = |i: usize| &self.brightness.thumbnails[i];
-        let [dark, flood] = [PictureRole::Dark, PictureRole::Flood]
-            .map(|role| self.photos_of(|other| *other == role).first().copied());
+        let [dark, flood] =
+            [PictureRole::Dark, PictureRole::Flood].map(|role| self.photo_of(&role));
         let (dark, flood) = (thumbnail(dark?), thumbnail(flood?));
         let brightest = flood.iter().copied().fold(0.0, f64::max);
         let parts = (0..flood.len()).filter(|&n| flood[n] > MIN_RAMP_BRIGHTNESS * brightest);

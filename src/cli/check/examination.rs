@@ -46,6 +46,7 @@ impl<'a> Examination<'a> {
                 fallback: Some(Method::Learned),
                 window: self.window,
                 trust: TrustedCalibration::Declared,
+                is_registered: true,
             },
             folder: self.folder,
             source: self.scanned,

@@ -14,6 +14,7 @@ use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light, TorchSpot};
 use crate::transport::{
     CHANNELS, ColorMatrix, Decibels, Extent, SnrAccumulator, Transport, convert_color,
+    light_color_matrix,
 };
 
 /// Places of the torch, as shares of the picture.
@@ -169,7 +170,12 @@ impl Predictions {
         let lights = [("Relit: all light elements", flood)]
             .into_iter()
             .chain(torches);
+        let light_matrix = color_matrix.and_then(light_color_matrix);
         for (caption, light) in lights {
+            let light = match &light_matrix {
+                Some(matrix) => light.converted(matrix),
+                None => light,
+            };
             relighter.relight(&light, &AllCoresExecutor);
             let pixels = linear_rgb(&relighter);
             let picture = ReportPicture::new(caption, geometry.camera, pixels, color_matrix);

@@ -51,6 +51,9 @@ pub struct RecoverArgs {
     /// Which responses of display and camera to use where the photographs contradict capture.json
     #[arg(long, value_enum, default_value_t = TrustedCalibration::Declared)]
     pub trust: TrustedCalibration,
+    /// Do not estimate and correct shifts of the picture between photographs
+    #[arg(long)]
+    pub no_register: bool,
     /// Continue an interrupted recovery from FILE.ltm.checkpoint
     #[arg(long)]
     pub resume: bool,

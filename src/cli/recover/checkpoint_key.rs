@@ -37,6 +37,8 @@ pub struct CheckpointKey {
     pub patterns: Option<u32>,
     /// `--trust`.
     pub trust: String,
+    /// `--no-register`.
+    pub no_register: bool,
     /// `--memory`, unless all photographs fit in it.
     pub memory_bytes: Option<u64>,
     /// The files read, by their names in the manifest.
@@ -70,6 +72,7 @@ impl CheckpointKey {
             window: args.window.map(Window::side),
             patterns: args.patterns,
             trust: value_name(args.trust),
+            no_register: args.no_register,
             memory_bytes: (!(plan.fits_photographs() && fits)).then_some(args.memory.0),
             files: files.collect::<Result<_>>()?,
             tiles: plan.tiles(),
@@ -94,9 +97,14 @@ impl CheckpointKey {
     }
 
     /// Names and values of the options.
-    fn options(&self) -> [(&'static str, String); 6] {
+    fn options(&self) -> [(&'static str, String); 7] {
         let text = |value: Option<String>, none: &str| value.unwrap_or_else(|| none.to_owned());
         let number = |value: Option<u64>, none| text(value.map(|value| value.to_string()), none);
+        let no_register = if self.no_register {
+            "given"
+        } else {
+            "not given"
+        };
         let memory = number(self.memory_bytes, "enough for all photographs");
         [
             ("--method", self.method.clone()),
@@ -107,6 +115,7 @@ impl CheckpointKey {
                 number(self.patterns.map(u64::from), "not given"),
             ),
             ("--trust", self.trust.clone()),
+            ("--no-register", no_register.to_owned()),
             ("--memory", memory),
         ]
     }

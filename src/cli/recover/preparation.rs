@@ -10,7 +10,7 @@ use super::messages::{self, UnusableError};
 use crate::capture::{CameraResponse, CaptureFolder, CodeStatistics, Manifest};
 use crate::cli::finding::Finding;
 use crate::cli::progress;
-use crate::export::{self, MIN_PLAUSIBLE_SNR, PreparedExport};
+use crate::export::{self, ExportSettings, MIN_PLAUSIBLE_SNR, PreparedExport};
 use crate::job_executor::Executor;
 use crate::recover::{
     CaptureFault, Method, PreparedRecovery, RecoverError, WindowSizeEstimate, diagnose,
@@ -47,6 +47,8 @@ pub struct PreparationSettings {
     /// `None` to estimate it.
     pub window: Option<Window>,
     pub trust: TrustedCalibration,
+    /// Whether shifts between photographs are estimated and corrected.
+    pub is_registered: bool,
 }
 
 impl PreparationSettings {
@@ -56,6 +58,7 @@ impl PreparationSettings {
             fallback: None,
             window: args.window,
             trust: args.trust,
+            is_registered: !args.no_register,
         }
     }
 }
@@ -423,8 +426,12 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     fn attempt(&self, method: Method, sample: CaptureSample<S::Dark>) -> Attempt<S::Dark> {
         let _spinner = progress::spinner("learning");
         let cores = self.source.cores();
-        let preparation =
-            export::prepare(&sample.measurements, method, self.settings.window, cores);
+        let settings = ExportSettings {
+            method,
+            window: self.settings.window,
+            is_registered: self.settings.is_registered,
+        };
+        let preparation = export::prepare(&sample.measurements, settings, cores);
         Attempt {
             method,
             prepared: pollster::block_on(preparation),

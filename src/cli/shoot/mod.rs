@@ -1,7 +1,8 @@
 //! `ltm-export shoot`: shows the pictures of a sequence, photographs each, checks it at once, and makes a capture folder.
 //!
 //! A page in a browser shows the pictures ([`player_server`]); a command or a tethering program takes the photographs
-//! ([`camera`]); the first find exposure time and delay ([`trial_photographs`]); every photograph is checked against those before ([`photograph_check`]) and kept ([`session_store`]).
+//! ([`camera`]). Trial photographs find the exposure time and the display's delay ([`trial_photographs`]); every photograph is checked
+//! against those before ([`photograph_check`]) and kept ([`session_store`]).
 
 mod camera;
 mod photograph_check;
@@ -54,7 +55,7 @@ pub struct ShootArgs {
     /// {microseconds}
     #[arg(long, value_name = "TIME", value_delimiter = ',', value_parser = Exposure::parse)]
     exposures: Vec<Exposure>,
-    /// Seconds between a picture and its photograph: the display's delay
+    /// Seconds between a picture and its photograph, at least: the display's delay. More, if its afterglow takes longer
     #[arg(long, value_name = "SECONDS", default_value_t = 0.3, value_parser = |text: &str| parse_number(text, 0.0, 60.0))]
     settle: f32,
     /// Seconds until a photograph has to be there [default: 60, with watch:FOLDER 600]
@@ -259,9 +260,18 @@ fn shoot(
         None => None,
     };
     let begun_with = Duration::from_secs_f32(settings.settle_seconds);
-    photographer.settle = begun_with.max(photographer.settings.settle);
+    if begun_with > photographer.settle {
+        photographer.settle = begun_with;
+        photographer.say(&format!(
+            "photographs wait for {:.2} seconds, as was found when the session was begun",
+            settings.settle_seconds
+        ));
+    }
     photographer.run(store, &settings)?;
-    Ok(settings)
+    Ok(SessionSettings {
+        settle_seconds: photographer.settle.as_secs_f32(),
+        ..settings
+    })
 }
 
 /// Lets the page say how the session ended; if it is not complete, the page waits for the next run.

@@ -91,7 +91,7 @@ impl PhotographCheck {
         let emissions = sequence.pictures.iter().map(|picture| {
             let codes = match (&picture.role, picture.role.codes(light)) {
                 (PictureRole::Pattern { pattern }, _) => read_codes(&folder.join(pattern), light)?,
-                // No pattern follows a picture with colours.
+                // In the sequences of `patterns`, no pattern follows a picture with colours.
                 (_, codes) => codes.map(|codes| codes.plane(0)).unwrap_or_default(),
             };
             Ok(codes

@@ -12,8 +12,10 @@ use crate::cli::assemble::PhotographLevels;
 
 /// Share of the flood's light that may be left when the dark picture is photographed.
 const MAX_AFTERGLOW: f64 = 0.005;
-/// Times that the wait for the display is doubled, at most.
-const MAX_DOUBLINGS: u32 = 4;
+/// Light of the flood, as a share of white, from which an afterglow can be measured.
+const MIN_FLOOD_LIGHT: f64 = 0.01;
+/// Longest wait that is tried.
+const MAX_SETTLE: Duration = Duration::from_secs(5);
 /// Least wait after a doubling.
 const MIN_SETTLE: Duration = Duration::from_millis(100);
 /// A display has changed after so many waits, if it has nearly changed after one.
@@ -119,14 +121,14 @@ impl Photographer<'_> {
 
     /// The brightest part of the flood, and whether it is saturated.
     fn brightness(&mut self, store: &SessionStore, flood: usize) -> Result<(f64, bool)> {
-        let taken = self.take_until_there(store, flood, 1)?;
+        let taken = self.take_with_retries(store, flood, 1)?;
         let levels = PhotographLevels::of(&taken.developed);
         Ok((taken.statistics.brightest, levels.is_saturated()))
     }
 
     /// Finds the time between a picture and its photograph after which nothing is left of the picture before: until the dark
-    /// picture after the flood is as dark as it stays. A pattern's check recognises what is left of another pattern; of an even
-    /// picture it does not.
+    /// picture after the flood is as dark as it stays. The check of a pattern detects the afterglow of another pattern, but not that
+    /// of a uniform picture.
     ///
     /// # Errors
     /// If no photograph can be taken.
@@ -136,44 +138,54 @@ impl Photographer<'_> {
         else {
             return Ok(());
         };
-        for doublings in 0..=MAX_DOUBLINGS {
+        let given = self.settle;
+        let mut first = None;
+        loop {
             let lit = self.mean(store, flood, LATE_WAITS)?;
             let early = self.mean(store, dark, 1)?;
             let late = self.mean(store, dark, LATE_WAITS)?;
-            let left = (early - late) / (lit - late);
-            // Also if it is not a number, as when the flood is dark: later checks say so.
-            if left <= MAX_AFTERGLOW || left.is_nan() {
+            // Later checks tell a dark flood.
+            if lit - late < MIN_FLOOD_LIGHT {
                 return Ok(());
             }
+            let afterglow = (early - late) / (lit - late);
+            if afterglow <= MAX_AFTERGLOW {
+                return Ok(());
+            }
+            let percent = 100.0 * afterglow;
             let seconds = self.settle.as_secs_f32();
-            if doublings == MAX_DOUBLINGS {
+            let first = *first.get_or_insert(afterglow);
+            let next = (2 * self.settle).max(MIN_SETTLE);
+            if next > MAX_SETTLE {
+                // An afterglow would have faded.
+                if afterglow > first / 2.0 {
+                    self.settle = given;
+                }
                 self.say(&format!(
-                    "warning: {seconds:.2} seconds after the flood, the dark picture still has {:.1} % of its light: the display is slow, or \
-                     the light changes; a longer --settle may help",
-                    100.0 * left
+                    "warning: {seconds:.2} seconds after the flood, the dark picture still differs from a later one by {percent:.1} % of the \
+                     flood's light: does other light change? Photographs wait for {:.2} seconds",
+                    self.settle.as_secs_f32()
                 ));
                 return Ok(());
             }
-            self.settle = (2 * self.settle).max(MIN_SETTLE);
+            self.settle = next;
             self.say(&format!(
-                "note: {seconds:.2} seconds after the flood, the dark picture has {:.1} % of its light left: photographs wait for {:.2} \
+                "note: {seconds:.2} seconds after the flood, the dark picture has {percent:.1} % of its light left: photographs wait for {:.2} \
                  seconds from now on",
-                100.0 * left,
                 self.settle.as_secs_f32()
             ));
         }
-        Ok(())
     }
 
     /// Mean measurement of a photograph of picture `i`, taken after `waits` times the wait for the display.
     fn mean(&mut self, store: &SessionStore, i: usize, waits: u32) -> Result<f64> {
-        let taken = self.take_until_there(store, i, waits)?;
+        let taken = self.take_with_retries(store, i, waits)?;
         let parts = &taken.developed.thumbnail;
         Ok(parts.iter().sum::<f64>() / parts.len() as f64)
     }
 
     /// Photographs picture `i` until a photograph is there, after `waits` times the wait for the display.
-    fn take_until_there(&mut self, store: &SessionStore, i: usize, waits: u32) -> Result<Taken> {
+    fn take_with_retries(&mut self, store: &SessionStore, i: usize, waits: u32) -> Result<Taken> {
         let mut failures = 0;
         loop {
             match self.take(store, i, waits + failures) {

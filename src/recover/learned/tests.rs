@@ -550,7 +550,12 @@ mod in_groups {
         let (measurements, _) = measurements(30, 3);
         let prepare = |method, window, size| {
             let prepared = run_in_group(size, |executor| {
-                let preparation = export::prepare(&measurements, method, window, executor);
+                let settings = export::ExportSettings {
+                    method,
+                    window,
+                    is_registered: true,
+                };
+                let preparation = export::prepare(&measurements, settings, executor);
                 let prepared = pollster::block_on(preparation).unwrap();
                 let snr = prepared.expected_snr().unwrap();
                 let recovery = postcard::to_allocvec(&prepared.recovery).unwrap();

@@ -61,7 +61,8 @@ const MIN_USED: usize = 2 * MIN_PATTERNS;
 /// Range of a correction's scale. A photograph of something else has none.
 const SCALES: [f64; 2] = [0.05, 20.0];
 
-/// Estimates the photometry of all photographs, which `preparation` holds uncorrected; `mean_function` is `[slot]`.
+/// Estimates the photometry of all photographs, which `preparation` holds uncorrected; `mean_function` is `[slot]`. Their
+/// shifts are only estimated if they `is_registered`.
 /// Nothing is changed where there are too few photographs or too little picture to tell, or if too many photographs
 /// seem not to belong.
 ///
@@ -70,6 +71,7 @@ const SCALES: [f64; 2] = [0.05, 20.0];
 pub(in crate::recover) async fn estimate(
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
     mean_function: &[f64],
+    is_registered: bool,
 ) -> Result<Photometry, Cancelled> {
     let measurements = preparation.measurements;
     let count = measurements.patterns.len();
@@ -90,6 +92,7 @@ pub(in crate::recover) async fn estimate(
     let mut readmitted: Vec<usize> = Vec::new();
     let mut readmission_steps = 0;
     let max_outliers = (MAX_OUTLIER_SHARE * count as f64) as usize;
+    let max_shift_steps = if is_registered { MAX_SHIFT_STEPS } else { 0 };
     let (mut steps, mut shift_steps) = (0, 0);
     // Softnesses that were tried, each after its unexplained share.
     let mut tried: Vec<(f64, f64)> = Vec::new();
@@ -124,7 +127,7 @@ pub(in crate::recover) async fn estimate(
             continue;
         }
         let found = step.outliers();
-        if found.is_empty() && shift_steps < MAX_SHIFT_STEPS && step.has_shifts() {
+        if found.is_empty() && shift_steps < max_shift_steps && step.has_shifts() {
             step.apply_shifts(&used, &mut photometry.corrections, &used);
             (steps, shift_steps) = (0, shift_steps + 1);
         } else if found.is_empty() && shift_steps > 0 && tried.is_empty() {

@@ -30,7 +30,7 @@ fn photometry_of(capture: &SyntheticCapture) -> Photometry {
     };
     let photometry = pollster::block_on(async {
         let mean = mean_function(&preparation).await?;
-        Ok::<_, RecoverError>(estimate(&preparation, &mean).await?)
+        Ok::<_, RecoverError>(estimate(&preparation, &mean, true).await?)
     });
     photometry.unwrap_or_else(|error| panic!("{error}"))
 }

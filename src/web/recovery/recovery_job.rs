@@ -9,7 +9,8 @@ use super::group_executor::{GroupExecutor, ProcessGroup};
 use super::measurement_input::MeasurementInput;
 use crate::capture::Measurements;
 use crate::export::{
-    self, FileQuality, MIN_PLAUSIBLE_SNR, PreparedExport, Provenance, has_implausible_saturation,
+    self, ExportSettings, FileQuality, MIN_PLAUSIBLE_SNR, PreparedExport, Provenance,
+    has_implausible_saturation,
 };
 use crate::recover::{
     MIN_PATTERNS, Method, PhotographFault, PreparedRecovery, RecoverError, SparsityBasis,
@@ -49,9 +50,13 @@ impl Recovery {
         group: Option<ProcessGroup>,
     ) -> Result<Self, CodedError> {
         let method = parse_method(method, basis.as_deref())?;
-        let window = window.map(Window::new).transpose()?;
+        let settings = ExportSettings {
+            method,
+            window: window.map(Window::new).transpose()?,
+            is_registered: true,
+        };
         let executor = GroupExecutor::join(group);
-        let preparation = export::prepare(&input.measurements, method, window, &executor);
+        let preparation = export::prepare(&input.measurements, settings, &executor);
         let prepared = report_jobs_of(&on_job, preparation).await;
         let prepared = prepared.map_err(|error| name_shots(input, error))?;
         let tiles = prepared.recovery.geometry().tile_grid().area();

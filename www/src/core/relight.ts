@@ -3,6 +3,7 @@
 import { loadCpu } from '../engine/core-modules.js';
 import { createOutputTransform } from '../engine/output-settings.js';
 import type { CpuModule, ImportedPhoto, Light } from '../engine/wasm-exports.js';
+import { cameraLightConverter } from '../lights/camera-light.js';
 import { toPhotoError } from '../shared/errors.js';
 import type { Gamut, LightName, ToneCurve } from '../shared/keywords.js';
 import {
@@ -84,7 +85,8 @@ export async function relight(
     await photo.photograph.withModule(module, (modulePhoto) => {
       photo.relighter ??= new module.RowRangeRelighter(modulePhoto, 0, height);
       const { relighter } = photo;
-      const lightInModule = createLight(module, modulePhoto, light);
+      const convert = cameraLightConverter(module, modulePhoto, photo.photograph);
+      const lightInModule = convert(createLight(module, modulePhoto, light));
       const transform = createOutputTransform(
         module,
         output,

@@ -2,6 +2,7 @@
 
 import type { Freeable, ImportedPhoto, Light, RelightModule } from '../engine/wasm-exports.js';
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
+import { type CameraColors, cameraLightConverter, type LightConverter } from './camera-light.js';
 import { createBuiltinLight, type LightSetting } from './light-setting.js';
 
 /** Whether a frame has the requested light. */
@@ -10,6 +11,12 @@ export interface AppliedLightStatus {
   readonly lightApplied: boolean;
   /** Why the requested light is unavailable; `null` if it is not, or is only loading. */
   readonly lightError: PhotoError | null;
+}
+
+/** A photograph that lights are made for. */
+export interface LitPhotograph extends CameraColors {
+  /** A photograph without tiles in a module. */
+  createLightPlane(module: RelightModule): ImportedPhoto;
 }
 
 export class LightCache implements Freeable {
@@ -21,7 +28,14 @@ export class LightCache implements Freeable {
   constructor(
     private readonly module: Pick<RelightModule, 'Light'>,
     private readonly lightPlane: ImportedPhoto,
+    private readonly convert: LightConverter = (light) => light,
   ) {}
+
+  /** A cache of lights for a photograph. */
+  static of(module: RelightModule, photograph: LitPhotograph): LightCache {
+    const lightPlane = photograph.createLightPlane(module);
+    return new LightCache(module, lightPlane, cameraLightConverter(module, lightPlane, photograph));
+  }
 
   /**
    * The light of a frame, owned by the cache: the same object as last time if and only if its content is unchanged.
@@ -38,13 +52,13 @@ export class LightCache implements Freeable {
         lightError = toPhotoError(thrown);
       }
       lightApplied = light !== null;
-      if (light) this.#replace(light, null);
+      if (light) this.#replace(this.convert(light), null);
     }
     const isCurrent = setting.image !== null || setting === this.#setting;
     if (this.#light && isCurrent) return { light: this.#light, lightApplied, lightError };
     // Lights are large: free the old one before making the new one.
     this.#replace(null, null);
-    const light = createBuiltinLight(this.module, this.lightPlane, setting);
+    const light = this.convert(createBuiltinLight(this.module, this.lightPlane, setting));
     this.#replace(light, setting);
     return { light, lightApplied, lightError };
   }

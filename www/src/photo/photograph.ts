@@ -37,6 +37,7 @@ type TileLocation = ModuleTiles | 'workers' | 'in transit' | TransferredTile;
 export class LoadedPhotograph implements Freeable {
   readonly info: PhotoInfo;
   readonly colorMatrix: ColorMatrix;
+  readonly hasColorMatrix: boolean;
   #tiles: TileLocation[];
   /** One, unless a move has failed halfway. */
   readonly #stores = new Set<ModuleTiles>();
@@ -54,7 +55,9 @@ export class LoadedPhotograph implements Freeable {
   ) {
     const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
     const metadata = parseMetadata(descriptor.metadata);
-    this.colorMatrix = parseColorMatrix(metadata.color_matrix);
+    const { color_matrix } = metadata;
+    this.hasColorMatrix = color_matrix !== undefined;
+    this.colorMatrix = parseColorMatrix(color_matrix);
     this.info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
     this.#tiles = tiles;
   }

@@ -19,7 +19,7 @@ export function createModuleRenderer(
   lease: DeviceLease | null = null,
 ): Renderer {
   const { kernel, gamut } = relighter;
-  const lights = new LightCache(module, photograph.createLightPlane(module));
+  const lights = LightCache.of(module, photograph);
   /** Whether the device's light is an uploaded image. */
   let hasUploadedImage = false;
   return {
@@ -30,7 +30,8 @@ export function createModuleRenderer(
     render(setting, output, quality) {
       const transform = createOutputTransform(module, output, photograph.colorMatrix, gamut);
       try {
-        if (upload(relighter, setting.image)) {
+        // The device downsamples an image as it is; that of a photograph with a colour matrix is converted.
+        if (!photograph.hasColorMatrix && upload(relighter, setting.image)) {
           hasUploadedImage = true;
           relighter.renderLightImage(transform, quality);
           return { lightApplied: true, lightError: null };

@@ -29,7 +29,7 @@ export async function createWorkerRenderer(
   // A browser without support for the gamut ignores it.
   const { colorSpace } = context.getContextAttributes?.() ?? {};
   const gamut = colorSpace === requestedGamut ? requestedGamut : 'srgb';
-  const lights = new LightCache(module, photograph.createLightPlane(module));
+  const lights = LightCache.of(module, photograph);
   const { colorMatrix } = photograph;
   let isFreed = false;
   const checkNotFreed = () => {
