@@ -92,6 +92,8 @@ pub(in crate::recover) async fn estimate(
     let mut readmitted: Vec<usize> = Vec::new();
     let mut readmission_steps = 0;
     let max_outliers = (MAX_OUTLIER_SHARE * count as f64) as usize;
+    // Pages always register photographs, and their module is smaller if that is known at compile time.
+    let is_registered = is_registered || cfg!(target_arch = "wasm32");
     let max_shift_steps = if is_registered { MAX_SHIFT_STEPS } else { 0 };
     let (mut steps, mut shift_steps) = (0, 0);
     // Softnesses that were tried, each after its unexplained share.
