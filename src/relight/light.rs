@@ -294,6 +294,18 @@ mod tests {
     const PLANE: Extent = Extent::new(32, 16);
 
     #[test]
+    fn conversion_keeps_white_and_replaces_negative_emissions_by_0() {
+        let light = Light::from_linear_rgb(Extent::new(2, 1), &[1.0, 1.0, 1.0, 0.0, 0.5, 0.0]);
+        let matrix = [[1.5, -0.5, 0.0], [0.0, 1.0, 0.0], [0.25, 0.25, 0.5]];
+        let converted = light.unwrap().converted(&matrix);
+        let [white, green] = converted.elements() else {
+            panic!("two elements");
+        };
+        assert_eq!(white[..3], [1.0, 1.0, 1.0]);
+        assert_eq!(green[..3], [0.0, 0.5, 0.125]);
+    }
+
+    #[test]
     fn built_in_lights_have_names_and_stay_in_range() {
         for (name, light) in BuiltinLight::BY_NAME {
             assert_eq!(BuiltinLight::from_name(name), Some(light));

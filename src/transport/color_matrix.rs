@@ -40,7 +40,7 @@ pub fn inverse_color_matrix(matrix: &ColorMatrix) -> Option<ColorMatrix> {
 
 /// The matrix from a light's linear sRGB to the brightness of each channel of the camera, relative to white light: `diag(1/w) M⁻¹`,
 /// where `M` is the photograph's colour matrix and `w = M⁻¹ (1, 1, 1)`. White stays white, and a neutral object has the light's
-/// colour; on coloured objects it is an approximation. `None` if the colour matrix has no inverse.
+/// colour; on coloured objects it is an approximation. `None` if the colour matrix has no inverse, or a component of `w` is not above 0.
 pub fn light_color_matrix(color_matrix: &ColorMatrix) -> Option<ColorMatrix> {
     let inverse = inverse_color_matrix(color_matrix)?;
     let white = inverse.map(|row| row.iter().sum::<f64>());

@@ -42,7 +42,13 @@ pub fn session_color_matrix(session: &Session) -> Option<ColorMatrix> {
             None
         }
     };
-    let matrix = color_matrix(&photographed.unwrap_or(declared))?;
+    let Some(matrix) = color_matrix(&photographed.unwrap_or(declared)) else {
+        eprintln!(
+            "note: {}: LibRaw's matrix of the camera's colours is implausible, and is not used",
+            flood.display()
+        );
+        return None;
+    };
     let is_identity = (0..CHANNELS).all(|i| {
         (0..CHANNELS).all(|j| (matrix[i][j] - f64::from(u8::from(i == j))).abs() < MIN_DIFFERENCE)
     });

@@ -144,11 +144,11 @@ impl Photographer<'_> {
             let lit = self.mean(store, flood, LATE_WAITS)?;
             let early = self.mean(store, dark, 1)?;
             let late = self.mean(store, dark, LATE_WAITS)?;
-            // Later checks tell a dark flood.
             if lit - late < MIN_FLOOD_LIGHT {
+                self.say("note: the picture is too dark on average to find how long the display takes to change");
                 return Ok(());
             }
-            let afterglow = (early - late) / (lit - late);
+            let afterglow = ((early - late) / (lit - late)).abs();
             if afterglow <= MAX_AFTERGLOW {
                 return Ok(());
             }
@@ -158,12 +158,16 @@ impl Photographer<'_> {
             let next = (2 * self.settle).max(MIN_SETTLE);
             if next > MAX_SETTLE {
                 // An afterglow would have faded.
-                if afterglow > first / 2.0 {
-                    self.settle = given;
-                }
+                let cause = match afterglow > first / 2.0 {
+                    true => {
+                        self.settle = given;
+                        "does room light change?"
+                    }
+                    false => "is the display slow? A longer --settle may help.",
+                };
                 self.say(&format!(
                     "warning: {seconds:.2} seconds after the flood, the dark picture still differs from a later one by {percent:.1} % of the \
-                     flood's light: does other light change? Photographs wait for {:.2} seconds",
+                     flood's light: {cause} Photographs wait for {:.2} seconds",
                     self.settle.as_secs_f32()
                 ));
                 return Ok(());

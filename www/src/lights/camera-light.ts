@@ -24,6 +24,7 @@ export function cameraLightConverter(
   const matrix = hasColorMatrix ? lightColorMatrix(colorMatrix) : null;
   if (!matrix) return (light) => light;
   const { lightWidth, lightHeight } = info;
+  const [toRed, toGreen, toBlue] = matrix;
   return (light) => {
     const values = light.linearRgb(0, lightHeight);
     light.free();
@@ -31,9 +32,9 @@ export function cameraLightConverter(
       const red = values[i] ?? 0;
       const green = values[i + 1] ?? 0;
       const blue = values[i + 2] ?? 0;
-      for (const [c, [r, g, b]] of matrix.entries()) {
-        values[i + c] = Math.max(0, r * red + g * green + b * blue);
-      }
+      values[i] = Math.max(0, toRed[0] * red + toRed[1] * green + toRed[2] * blue);
+      values[i + 1] = Math.max(0, toGreen[0] * red + toGreen[1] * green + toGreen[2] * blue);
+      values[i + 2] = Math.max(0, toBlue[0] * red + toBlue[1] * green + toBlue[2] * blue);
     }
     return Light.fromLinear(lightPlane, values, lightWidth, lightHeight);
   };

@@ -48,11 +48,12 @@ export class LightCache implements Freeable {
       let light: Light | null = null;
       try {
         light = setting.image.createLight(this.module, this.lightPlane);
+        light = light && this.convert(light);
       } catch (thrown) {
         lightError = toPhotoError(thrown);
       }
       lightApplied = light !== null;
-      if (light) this.#replace(this.convert(light), null);
+      if (light) this.#replace(light, null);
     }
     const isCurrent = setting.image !== null || setting === this.#setting;
     if (this.#light && isCurrent) return { light: this.#light, lightApplied, lightError };

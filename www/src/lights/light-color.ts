@@ -1,4 +1,4 @@
-/** The colour of a light. It is a part of the white balance: the light transport matrix keeps channels apart. */
+/** The colour of a light: factors on the picture's red, green and blue, like those of the white balance. */
 
 import { PhotoError } from '../shared/errors.js';
 import type { RgbGains } from '../shared/value-types.js';
