@@ -141,17 +141,11 @@ fn photograph_picture(args: &PhotographArgs, folder: &Path, path: &Path) -> Resu
     let truth = known_transport(args, &CaptureFolder::open(&args.capture)?)?;
     let sequence = sequence_of(args, &truth, folder)?;
     let light = sequence.layout.light;
+    let mut lights = read_emissions(&sequence.layout, path)?.map(|emissions| vec![emissions]);
     let mut random = RandomStreamId::Fault.start(args.seed);
-    let start = random.clone();
-    let lights = read_emissions(&sequence.layout, path)?.map(|emissions| {
-        let mut lights = [emissions];
-        // Every channel's faults are the same.
-        random = start.clone();
-        for fault in &args.faults {
-            fault.change_emissions(light, &mut lights, &mut [], &mut random);
-        }
-        lights.to_vec()
-    });
+    for lights in &mut lights {
+        random = change_emissions(args, light, lights, &mut []);
+    }
     let mut pictures = faulty_pictures(args, &truth, &lights, &mut random);
     let picture = pictures.first_mut().context("no picture")?;
     let gain = (args.exposure.seconds / REFERENCE_EXPOSURE) as f32;
@@ -188,27 +182,20 @@ fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
     // What displays do to patterns in particular.
     let (patterns, others): (Vec<usize>, Vec<usize>) = (0..emissions.len()).partition(is_pattern);
     let mut random = RandomStreamId::Fault.start(args.seed);
-    let start = random.clone();
-    let emissions: [Vec<Vec<f32>>; CHANNELS] = std::array::from_fn(|c| {
-        let lights_of = |list: &[usize]| {
-            list.iter()
-                .map(|i| emissions[*i][c].clone())
-                .collect::<Vec<_>>()
+    let mut changed: [Vec<Vec<f32>>; CHANNELS] = Default::default();
+    for (c, changed) in changed.iter_mut().enumerate() {
+        let lights_of = |list: &Vec<usize>| -> Vec<Vec<f32>> {
+            list.iter().map(|i| emissions[*i][c].clone()).collect()
         };
-        let [mut lights, mut other_lights] = [&patterns, &others].map(|list| lights_of(list));
-        // Every channel's faults are the same.
-        random = start.clone();
-        for fault in &args.faults {
-            fault.change_emissions(layout.light, &mut lights, &mut other_lights, &mut random);
-        }
-        let mut changed = vec![Vec::new(); emissions.len()];
+        let [mut lights, mut other_lights] = [&patterns, &others].map(lights_of);
+        random = change_emissions(args, layout.light, &mut lights, &mut other_lights);
+        changed.resize(emissions.len(), Vec::new());
         let order = patterns.iter().chain(&others);
         for (i, light) in order.zip(lights.into_iter().chain(other_lights)) {
             changed[*i] = light;
         }
-        changed
-    });
-    let pictures = faulty_pictures(args, &truth, &emissions, &mut random);
+    }
+    let pictures = faulty_pictures(args, &truth, &changed, &mut random);
     output_folder::write_atomically(&args.output, |root| {
         pictures
             .par_iter()
@@ -226,6 +213,21 @@ fn photograph_sequence(args: &PhotographArgs, folder: &Path) -> Result<()> {
     })?;
     eprintln!("{}: {} photographs", args.output.display(), pictures.len());
     Ok(())
+}
+
+/// Adds the display's faults to the emissions of one primary, `[light][M]`, under patterns and under other lights: those of each primary
+/// are the same. Returns the random numbers for further faults.
+fn change_emissions(
+    args: &PhotographArgs,
+    light: Extent,
+    patterns: &mut [Vec<f32>],
+    others: &mut [Vec<f32>],
+) -> ChaCha8Rng {
+    let mut random = RandomStreamId::Fault.start(args.seed);
+    for fault in &args.faults {
+        fault.change_emissions(light, patterns, others, &mut random);
+    }
+    random
 }
 
 /// The known transport of the capture.
@@ -334,11 +336,7 @@ fn photograph(
             .map(|pattern| pattern.plane(c).to_vec())
             .collect();
         let mut others = others.clone();
-        // Every channel's faults are the same.
-        let mut random = random();
-        for fault in &args.faults {
-            fault.change_emissions(light, &mut emissions, &mut others, &mut random);
-        }
+        change_emissions(args, light, &mut emissions, &mut others);
         emissions.extend(others);
         pictures.push(channel_pictures(truth, c, &emissions));
         bar.inc(1);
