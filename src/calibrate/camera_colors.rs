@@ -13,12 +13,6 @@ const MIN_LENGTH_RATIO: f64 = 0.1;
 /// Largest factor of a matrix that is plausible: a camera that needs more hardly tells the primaries apart.
 const MAX_FACTOR: f64 = 20.0;
 
-/// The camera's colours of the primaries of sRGB, as columns, from a matrix from its RGB to linear sRGB, of any unit. `None` if that
-/// has no inverse.
-pub fn primaries_from_matrix(camera_to_srgb: &ColorMatrix) -> Option<ColorMatrix> {
-    inverse_color_matrix(camera_to_srgb)
-}
-
 /// The camera's colours of the primaries, as columns, from the light of its photographs of a display that shows each: `lights[k]`
 /// is the camera's RGB of primary `k`, less that of the dark photograph, in any unit and through an object of any colour.
 ///
@@ -77,6 +71,7 @@ pub fn color_matrix(primaries: &ColorMatrix) -> Option<ColorMatrix> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
     /// From the RGB of a camera to linear sRGB.
     const CAMERA: ColorMatrix = [
         [3.7396, -0.5693, -0.1845],
@@ -85,7 +80,7 @@ mod tests {
     ];
 
     fn primaries() -> ColorMatrix {
-        primaries_from_matrix(&CAMERA).unwrap()
+        inverse_color_matrix(&CAMERA).unwrap()
     }
 
     fn assert_near(found: [f64; CHANNELS], expected: [f64; CHANNELS], tolerance: f64) {

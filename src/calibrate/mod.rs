@@ -11,9 +11,7 @@ mod graycode;
 mod graycode_fit;
 
 #[cfg(not(target_arch = "wasm32"))]
-pub use camera_colors::{
-    color_matrix, primaries_from_matrix, primaries_from_photographs, white_of,
-};
+pub use camera_colors::{color_matrix, primaries_from_photographs, white_of};
 pub use gray_code_quality::GrayCodeQuality;
 pub use graycode::{BitPair, CalibrationError, GrayCodePhotos, LightPlaneAxis};
 #[cfg(not(target_arch = "wasm32"))]

@@ -321,7 +321,6 @@ fn photograph(
         .into_par_iter()
         .map(|i| folder.read_pattern(i));
     let patterns = patterns.collect::<Result<Vec<Pattern>, _>>()?;
-    let random = || RandomStreamId::Fault.start(args.seed);
     let mut pictures: Vec<Vec<Vec<f32>>> = Vec::new();
     let uniform = |emission: f32| vec![emission; light.area()];
     let mut others = vec![uniform(0.0), uniform(1.0)];
@@ -343,7 +342,7 @@ fn photograph(
     }
     let mut pictures = interleave(&pictures);
     let mut others = pictures.split_off(original.shots.len());
-    let mut random = random();
+    let mut random = RandomStreamId::Fault.start(args.seed);
     for fault in &args.faults {
         fault.change_pictures(camera, &mut pictures, &mut random);
         fault.change_manifest(&mut manifest);

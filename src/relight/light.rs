@@ -4,7 +4,9 @@ use thiserror::Error;
 
 use super::resample::AreaResampler;
 use super::{fire, platform_math};
-use crate::transport::{ColorMatrix, Extent, Geometry, LightPosition, convert_color};
+use crate::transport::{
+    ColorMatrix, Extent, Geometry, LightPosition, convert_color, single_precision,
+};
 
 /// The linear emission of every light element, 0 to 1 at full brightness.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +114,7 @@ impl Light {
     /// The light with each element's RGB multiplied by `matrix`; negative emissions become 0. See
     /// [`light_color_matrix`](crate::transport::light_color_matrix).
     pub fn converted(&self, matrix: &ColorMatrix) -> Self {
-        let matrix = matrix.map(|row| row.map(|factor| factor as f32));
+        let matrix = single_precision(matrix);
         let convert = |&[r, g, b, rest]: &[f32; 4]| {
             let [r, g, b] = convert_color(&matrix, [r, g, b]).map(|emission| emission.max(0.0));
             [r, g, b, rest]

@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use super::srgb::srgb_encode;
-use crate::transport::{CHANNELS, CameraPixel, ColorMatrix, convert_color};
+use crate::transport::{CHANNELS, CameraPixel, ColorMatrix, convert_color, single_precision};
 
 /// How linear light becomes codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,10 +56,7 @@ impl OutputTransform {
     /// [`light_color_matrix`](crate::transport::light_color_matrix).
     pub fn with_color_matrix(self, color_matrix: &ColorMatrix) -> Self {
         Self {
-            matrix: product(
-                &self.matrix,
-                &color_matrix.map(|row| row.map(|factor| factor as f32)),
-            ),
+            matrix: product(&self.matrix, &single_precision(color_matrix)),
             ..self
         }
     }
@@ -81,7 +78,7 @@ impl OutputTransform {
     /// Linear RGB to encoded values of 0..=1, before dither. NaN becomes 0.
     pub fn encode(&self, linear: [f64; CHANNELS]) -> [f64; CHANNELS] {
         let converted = |row: [f32; CHANNELS]| {
-            // A factor of 0 leaves a channel out, also one that is not finite.
+            // A factor of 0 excludes its channel, even if the channel is not finite.
             let terms = row
                 .into_iter()
                 .zip(linear)

@@ -5,6 +5,11 @@ use super::CHANNELS;
 /// From linear RGB to linear RGB, row by row.
 pub type ColorMatrix = [[f64; CHANNELS]; CHANNELS];
 
+/// The matrix in single precision, in which pictures and lights are.
+pub fn single_precision(matrix: &ColorMatrix) -> [[f32; CHANNELS]; CHANNELS] {
+    matrix.map(|row| row.map(|factor| factor as f32))
+}
+
 /// The product of `matrix` and linear RGB.
 #[inline]
 pub fn convert_color(

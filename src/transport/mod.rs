@@ -26,7 +26,7 @@ mod tile;
 
 pub use color_matrix::{
     ColorMatrix, MAX_COLOR_FACTOR, convert_color, inverse_color_matrix, is_valid_color_matrix,
-    light_color_matrix,
+    light_color_matrix, single_precision,
 };
 pub use correspondence::Correspondence;
 pub use displacement_grid::{DisplacementGrid, SharedGrid};

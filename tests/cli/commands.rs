@@ -79,6 +79,13 @@ fn edit_manifest(capture: &Path, edit: impl FnOnce(&mut Value)) {
     fs::write(path, manifest.to_string()).unwrap();
 }
 
+/// Misspells a field of an object.
+fn rename(object: &mut Value, field: &str, misspelt: &str) {
+    let fields = object.as_object_mut().unwrap();
+    let value = fields.remove(field).unwrap();
+    fields.insert(misspelt.to_owned(), value);
+}
+
 /// Recovers a small file.
 fn recover_small_ltm(folder: &Path) -> PathBuf {
     let file = folder.join("small.ltm");
@@ -589,26 +596,14 @@ fn a_bad_manifest_is_refused_by_field() {
         &["capture.json: \"camera.white\" is missing"],
     );
     assert_refused(
-        |c| {
-            edit_manifest(c, |m| {
-                let camera = m["camera"].as_object_mut().unwrap();
-                let white = camera.remove("white").unwrap();
-                camera.insert("whtie".to_owned(), white);
-            })
-        },
+        |c| edit_manifest(c, |m| rename(&mut m["camera"], "white", "whtie")),
         &[
             "\"camera.white\" is missing",
             "correct the name of \"camera.whtie\" to \"white\"",
         ],
     );
     assert_refused(
-        |c| {
-            edit_manifest(c, |m| {
-                let light = m["light"].as_object_mut().unwrap();
-                let gamma = light.remove("gamma").unwrap();
-                light.insert("gama".to_owned(), gamma);
-            })
-        },
+        |c| edit_manifest(c, |m| rename(&mut m["light"], "gamma", "gama")),
         &[
             "\"light.gamma\" is missing, and so is \"light.response\"",
             "correct the name of \"light.gama\" to \"gamma\"",

@@ -7,10 +7,10 @@ use anyhow::Result;
 use super::photograph_list::is_raw;
 use super::session::Session;
 use crate::acquisition::{PictureRole, Primary};
-use crate::calibrate::{color_matrix, primaries_from_matrix, primaries_from_photographs, white_of};
+use crate::calibrate::{color_matrix, primaries_from_photographs, white_of};
 use crate::cli::advice::error_with_remedy;
 use crate::photo_file::{RawConversionError, RawConverter};
-use crate::transport::{CHANNELS, ColorMatrix};
+use crate::transport::{CHANNELS, ColorMatrix, inverse_color_matrix};
 
 /// A matrix whose factors differ by less from those of the identity is left out.
 const MIN_DIFFERENCE: f64 = 0.005;
@@ -66,7 +66,7 @@ pub fn raw_color_matrix(path: &Path, scratch: &Path) -> Option<ColorMatrix> {
 /// The camera's colours of the primaries of sRGB by the raw file at `path`; `None` if they are not known.
 fn raw_primaries(path: &Path, scratch: &Path) -> Option<ColorMatrix> {
     let reason = match RawConverter::default().camera_to_srgb(path, scratch) {
-        Ok(Some(matrix)) => return primaries_from_matrix(&matrix),
+        Ok(Some(matrix)) => return inverse_color_matrix(&matrix),
         Ok(None) => "LibRaw does not know this camera".to_owned(),
         Err(RawConversionError::ProgramMissing { program }) => {
             format!("LibRaw's program {program}, which knows them, is not installed")

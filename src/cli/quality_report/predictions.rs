@@ -14,7 +14,7 @@ use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light, TorchSpot};
 use crate::transport::{
     CHANNELS, ColorMatrix, Decibels, Extent, SnrAccumulator, Transport, convert_color,
-    light_color_matrix,
+    light_color_matrix, single_precision,
 };
 
 /// Places of the torch, as shares of the picture.
@@ -81,7 +81,7 @@ impl ReportPicture {
         color_matrix: Option<&ColorMatrix>,
     ) -> Self {
         if let Some(matrix) = color_matrix {
-            let matrix = matrix.map(|row| row.map(|factor| factor as f32));
+            let matrix = single_precision(matrix);
             let convert = |pixel: &mut [f32; CHANNELS]| *pixel = convert_color(&matrix, *pixel);
             pixels.iter_mut().for_each(convert);
         }
