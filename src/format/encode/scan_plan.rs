@@ -39,7 +39,7 @@ pub const MAX_SHARES: ByteShareLimits = ByteShareLimits {
 /// The step of component 0 in the first and in the last layer, relative to the others: under a flat light it
 /// alone is the picture, and under most lights most of it.
 const FIRST_FLAT_STEP_RATIO: f32 = 0.15;
-const LAST_FLAT_STEP_RATIO: f32 = 0.5;
+const LAST_FLAT_STEP_RATIO: f32 = 0.25;
 /// Ratio of the steps of two scans that refine the same item.
 const PASS_STEP_RATIO: f32 = 4.0;
 /// Ratio of the first step to the last, and the inverse share of items in the first layer, in a plan for measuring.
