@@ -40,7 +40,7 @@ pub const MAX_SHARES: ByteShareLimits = ByteShareLimits {
 /// alone is the picture, and under most lights most of it.
 const FIRST_FLAT_STEP_RATIO: f32 = 0.15;
 const LAST_FLAT_STEP_RATIO: f32 = 0.25;
-/// Ratio of the steps of two scans that refine the same item.
+/// Ratio of the steps of two scans that refine the same item, but for the last scan of component 0, which has a finer step.
 const PASS_STEP_RATIO: f32 = 4.0;
 /// Ratio of the first step to the last, and the inverse share of items in the first layer, in a plan for measuring.
 const TRIAL_FIRST_STEP_RATIO: f32 = 16.0;
