@@ -78,20 +78,21 @@ impl Recovered {
     }
 
     fn encode(&self, quality: EncodingTarget<'_>) -> Result<EncodedFile, FormatError> {
-        self.encode_by(quality, &SequentialExecutor, Vec::new())
+        self.encode_by(quality, &SequentialExecutor, metadata(), Vec::new())
     }
 
     fn encode_by(
         &self,
         quality: EncodingTarget<'_>,
         executor: &impl Executor,
+        metadata: Metadata,
         extensions: Vec<FormatExtension>,
     ) -> Result<EncodedFile, FormatError> {
         let source = EncoderInput {
             geometry: self.geometry.clone(),
             basis: self.basis.as_ref(),
             tile: &|i| Ok(self.tiles[i].clone()),
-            metadata: metadata(),
+            metadata,
             extensions,
         };
         EncodedFile::new(source, quality, executor)
@@ -287,10 +288,30 @@ fn the_same_transport_gives_the_same_bytes() {
     ] {
         let first = mixed().file(quality);
         let again = mixed()
-            .encode_by(quality, &ReversedExecutor, Vec::new())
+            .encode_by(quality, &ReversedExecutor, metadata(), Vec::new())
             .unwrap();
         assert!(first == bytes(&again), "{quality:?}");
     }
+}
+
+#[test]
+fn metadata_do_not_change_how_transport_is_coded() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let recovered = Recovered::mixed(common::tiled([128, 128], [64, 64], 5, 64, affine), 8, 5);
+    let quality = EncodingTarget::Snr(Decibels(35.0));
+    let short = recovered.encode(quality).unwrap();
+    let metadata = Metadata {
+        // More than the share of a file that the index may take with the first layer.
+        rights: "-".repeat(short.bytes() as usize / 5),
+        ..metadata()
+    };
+    let long = recovered
+        .encode_by(quality, &SequentialExecutor, metadata, Vec::new())
+        .unwrap();
+    assert_eq!(long.index().scans, short.index().scans);
+    let chunks =
+        |file: &EncodedFile| bytes(file).split_off(file.index().header.index_bytes() as usize);
+    assert!(chunks(&long) == chunks(&short));
 }
 
 #[test]
@@ -734,7 +755,7 @@ fn other_minor_versions_and_unknown_extensions_are_read_unless_they_must_be_unde
     let encode = |extensions| {
         bytes(
             &recovered
-                .encode_by(QUALITY, &SequentialExecutor, extensions)
+                .encode_by(QUALITY, &SequentialExecutor, metadata(), extensions)
                 .unwrap(),
         )
     };
@@ -765,7 +786,8 @@ fn invalid_displacements_are_refused() {
         must_understand: false,
         data: vec![0; 8],
     };
-    let encode = |extensions| recovered.encode_by(QUALITY, &SequentialExecutor, extensions);
+    let encode =
+        |extensions| recovered.encode_by(QUALITY, &SequentialExecutor, metadata(), extensions);
     let file = bytes(&encode(vec![other.clone()]).unwrap());
     let (transport, _) = decode(&file, 100).unwrap();
     assert_eq!(transport.geometry, recovered.geometry);

@@ -150,7 +150,7 @@ impl<'a, E: Executor> RateController<'a, E> {
         let (mut file, mut is_within) = encode(1.0)?;
         for factor in RETRY_SHARE_FACTORS {
             // A reader fetches small files at once.
-            if is_within || file.bytes() <= FIRST_BYTES {
+            if is_within || bytes_without_metadata(&file) <= FIRST_BYTES {
                 break;
             }
             (file, is_within) = encode(factor)?;
@@ -204,15 +204,26 @@ impl<'a, E: Executor> RateController<'a, E> {
     }
 }
 
-/// Whether the index with the first `first_scans` scans, and every later scan, keep [`MAX_SHARES`].
+/// Whether the index with the first `first_scans` scans, and every later scan, keep [`MAX_SHARES`] of the file.
+/// Metadata do not count, so that transport is coded the same whatever is written about it.
 fn is_within_shares(file: &EncodedFile, first_scans: usize) -> bool {
     let index = file.index();
-    let share = |bytes: u64| bytes as f64 / file.bytes() as f64;
+    let file_bytes = bytes_without_metadata(file);
+    let share = |bytes: u64| bytes as f64 / file_bytes as f64;
     let scan_range = |scan: usize| index.scan_range(scan);
-    share(scan_range(first_scans - 1).end) <= MAX_SHARES.first
+    let first_bytes = scan_range(first_scans - 1).end - metadata_bytes(file);
+    share(first_bytes) <= MAX_SHARES.first
         && (first_scans..index.scans.len())
             .map(scan_range)
             .all(|range| share(range.end - range.start) <= MAX_SHARES.scan)
+}
+
+fn bytes_without_metadata(file: &EncodedFile) -> u64 {
+    file.bytes() - metadata_bytes(file)
+}
+
+fn metadata_bytes(file: &EncodedFile) -> u64 {
+    u64::from(file.index().header.metadata.bytes)
 }
 
 /// The metric's tiles in the file's coding: as direct functions where the file has no components.
