@@ -4,8 +4,14 @@ use std::collections::BinaryHeap;
 
 /// The indices of the keys in ascending order. Equal keys keep their order.
 pub(crate) fn ascending_order(keys: impl IntoIterator<Item = f64>) -> Vec<usize> {
-    let keys = keys.into_iter().map(to_ordered_bits).zip(0..).collect();
-    sorted_pairs(keys).into_iter().map(|(_, i)| i).collect()
+    order_of(keys.into_iter().map(to_ordered_bits).collect())
+}
+
+/// Apart, as each caller has an iterator of its own.
+#[inline(never)]
+fn order_of(keys: Vec<i64>) -> Vec<usize> {
+    let pairs = keys.into_iter().zip(0..).collect();
+    sorted_pairs(pairs).into_iter().map(|(_, i)| i).collect()
 }
 
 /// Sorts values in ascending order.

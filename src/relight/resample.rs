@@ -12,7 +12,7 @@ use crate::transport::Extent;
 /// # Panics
 /// If `values` does not have the length of `from`.
 pub fn area_resample(values: &[f32], from: Extent, to: Extent) -> Vec<f32> {
-    assert_eq!(values.len(), from.area() * 3, "three values a pixel");
+    assert!(values.len() == from.area() * 3, "three values a pixel");
     let mut resampler = AreaResampler::new(from, to);
     for row in values.chunks_exact(3 * from.width as usize) {
         resampler.add_linear_row(row);
