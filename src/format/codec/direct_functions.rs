@@ -9,6 +9,7 @@ use std::ops::Range;
 
 use super::colour::{ColourVector, finite, ycocg_forward};
 use super::scan_functions::ScanFunctions;
+use super::sum_rounding::{FIRST_SUM_WEIGHT, RoundedSlot, SUM_WEIGHT, restore_sums};
 use super::tokens::{EncodableRuns, EntropyTokenReader, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
 use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
@@ -16,12 +17,6 @@ use crate::format::error::{FormatError, SectionError, damaged};
 use crate::format::memory_budget::{MemoryBudget, vec_bytes};
 use crate::format::scan::ProgressiveScan;
 use crate::transport::{CHANNELS, Extent, Window};
-
-/// Added to a magnitude in steps before it is truncated. Less than a half: small values are mostly noise,
-/// whose bits reduce the error less than those of large ones.
-const ROUNDING_OFFSET: f32 = 0.2;
-/// The same where a later scan refines the value.
-const COARSE_ROUNDING_OFFSET: f32 = 0.3;
 
 /// The centre-out order of a window's slots: by distance from its centre, then by slot.
 ///
@@ -125,9 +120,9 @@ impl EncodableRuns for CentreOutDirectFunctions {
             numbers.clear();
             let function = &function[items.clone()];
             for tau in function {
-                let rgb = tau.map(|t| round(t, step, ROUNDING_OFFSET));
-                residuals.extend((0..CHANNELS).map(|c| tau[c] - rgb[c] as f32 * step));
-                numbers.extend(ycocg_forward(rgb));
+                let slot = RoundedSlot::new(*tau, step);
+                residuals.extend(slot.residual.map(|r| r * step));
+                numbers.extend(ycocg_forward(slot.numbers));
             }
             visit(QuantisedRun {
                 string: 0,
@@ -156,35 +151,36 @@ impl QuantisedDirectFunctions {
     /// Quantises functions, `[pixel, slot]`, by `scans`.
     pub fn new(functions: &[ColourVector], order: &[u16], scans: &[ProgressiveScan]) -> Self {
         let mut residual = CentreOutDirectFunctions::new(functions, order).values;
-        let square = |residual: &[ColourVector]| {
-            let all = residual.as_flattened().iter();
-            all.map(|t| f64::from(*t).powi(2)).sum::<f64>()
-        };
-        let (mut numbers, mut errors) = (Vec::new(), vec![square(&residual)]);
-        for (s, scan) in scans.iter().enumerate() {
-            let mut own = Vec::new();
-            if !scan.coding.is_direct() {
-                errors.push(errors[s]);
-                numbers.push(own);
-                continue;
-            }
-            let later = scans[s + 1..].iter().filter(|scan| scan.coding.is_direct());
-            let offset = |k: usize| match later.clone().any(|later| later.items().contains(&k)) {
-                true => COARSE_ROUNDING_OFFSET,
-                false => ROUNDING_OFFSET,
+        let mut numbers = vec![Vec::new(); scans.len()];
+        let mut errors = vec![0.0; scans.len() + 1];
+        for function in residual.chunks_exact_mut(order.len()) {
+            errors[0] += square(function);
+            let mut outputs = numbers.iter_mut().zip(&mut errors[1..]);
+            let mut weight = FIRST_SUM_WEIGHT;
+            // Scans of one step that follow each other without gaps are rounded together.
+            let is_joined = |a: &ProgressiveScan, b: &ProgressiveScan| {
+                (a.coding, a.step, a.end()) == (b.coding, b.step, b.items().start)
             };
-            let offsets: Vec<f32> = scan.items().map(offset).collect();
-            for function in residual.chunks_exact_mut(order.len()) {
-                for (tau, offset) in function[scan.items()].iter_mut().zip(&offsets) {
-                    let rgb = tau.map(|t| round(t, scan.step, *offset));
-                    for (t, number) in tau.iter_mut().zip(rgb) {
-                        *t -= number as f32 * scan.step;
+            for layer in scans.chunk_by(is_joined) {
+                let (first, step) = (layer[0].items().start, layer[0].step);
+                let mut slots = Vec::new();
+                if layer[0].coding.is_direct() {
+                    let values = &function[first..layer[layer.len() - 1].end()];
+                    slots.extend(values.iter().map(|tau| RoundedSlot::new(*tau, step)));
+                    restore_sums(&mut slots, weight);
+                    weight = SUM_WEIGHT;
+                }
+                let mut slots = slots.into_iter();
+                for (scan, (numbers, error)) in layer.iter().zip(&mut outputs) {
+                    for (k, slot) in scan.items().zip(slots.by_ref()) {
+                        for (t, number) in function[k].iter_mut().zip(slot.numbers) {
+                            *t -= number as f32 * step;
+                        }
+                        numbers.extend(ycocg_forward(slot.numbers));
                     }
-                    own.extend(ycocg_forward(rgb));
+                    *error += square(function);
                 }
             }
-            numbers.push(own);
-            errors.push(square(&residual));
         }
         Self {
             numbers,
@@ -226,10 +222,10 @@ impl QuantisedDirectFunctions {
     }
 }
 
-fn round(x: f32, step: f32, offset: f32) -> i32 {
-    // Co and Cg are up to twice as large.
-    let steps = (x.abs() / step + offset) as i32; // `as` saturates
-    steps.min(MAX_MAGNITUDE / 2) * if x < 0.0 { -1 } else { 1 }
+/// The sum of squares.
+fn square(values: &[ColourVector]) -> f64 {
+    let all = values.as_flattened().iter();
+    all.map(|t| f64::from(*t).powi(2)).sum()
 }
 
 #[cfg(test)]
@@ -315,6 +311,60 @@ mod tests {
                 let left: f64 = off.map(|off| off * off).sum();
                 assert!((left / error - 1.0).abs() < 0.01, "{left} {error}");
             }
+        }
+    }
+
+    #[test]
+    fn a_layer_keeps_sums_however_it_is_cut_into_scans() {
+        let order = order(5);
+        let functions = functions(25);
+        let step = 0.03;
+        let quantised = |cuts: &[u16]| {
+            let mut scans = vec![ProgressiveScan::new(ScanCoding::Direct, 0, 10, 8.0 * step)];
+            let ranges = cuts.windows(2).map(|cut| (cut[0], cut[1] - cut[0]));
+            let layer = ranges
+                .map(|(first, count)| ProgressiveScan::new(ScanCoding::Direct, first, count, step));
+            scans.extend(layer);
+            QuantisedDirectFunctions::new(&functions, &order, &scans).residual
+        };
+        let residual = quantised(&[0, 25]);
+        assert_eq!(residual, quantised(&[0, 3, 12, 25]));
+        let sums = |of: &dyn Fn(&ColourVector) -> f32| -> f32 {
+            let pixels = residual.chunks_exact(25);
+            pixels
+                .map(|residual| residual.iter().map(of).sum::<f32>().abs())
+                .sum()
+        };
+        let rounded: f32 = functions
+            .chunks_exact(25)
+            .map(|function| {
+                let slots = function.iter().map(|tau| RoundedSlot::new(*tau, step));
+                slots.map(|slot| slot.residual[1] * step).sum::<f32>().abs()
+            })
+            .sum();
+        let restored = sums(&|tau| tau[1]);
+        assert!(restored < 0.8 * rounded, "{restored} {rounded}");
+    }
+
+    #[test]
+    fn scans_of_one_step_may_bring_a_slot_again() {
+        let order = order(5);
+        let functions = functions(25);
+        let scan =
+            |first, count, step| ProgressiveScan::new(ScanCoding::Direct, first, count, step);
+        let scans = [scan(0, 10, 0.1), scan(0, 1, 0.1), scan(0, 25, 0.01)];
+        let quantised = QuantisedDirectFunctions::new(&functions, &order, &scans);
+        let mut got = vec![[0.0; CHANNELS]; functions.len()];
+        for (scan, chunk) in scans.iter().zip(quantised.chunks(&scans).unwrap()) {
+            if !chunk.bytes.is_empty() {
+                let (bytes, tokens) = (&chunk.bytes, chunk.content_bytes);
+                let decoded = decode(EXTENT.area(), &order, scan, bytes, tokens).unwrap();
+                add(&mut got, 25, &decoded);
+            }
+        }
+        let want = quantised.decoded(&functions, &order);
+        for (got, want) in got.as_flattened().iter().zip(want.as_flattened()) {
+            assert!((got - want).abs() < 1e-5, "{got} {want}");
         }
     }
 

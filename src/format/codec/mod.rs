@@ -14,6 +14,7 @@ mod dct;
 pub(super) mod direct_functions;
 pub(super) mod half_float_codec;
 pub(super) mod scan_functions;
+pub(super) mod sum_rounding;
 pub(super) mod tokens;
 pub(super) mod transform;
 pub(super) mod transform_encoder;

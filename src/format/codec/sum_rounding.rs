@@ -1,0 +1,158 @@
+//! Rounding of direct functions that keeps the brightness of pictures under wide lights.
+//!
+//! A light that covers a whole window sees the sum of a light transport function. Most values of a function are
+//! below a quantisation step and become 0; each error is small, but most have the same sign, so that pictures under
+//! such lights become darker. Errors e of a function therefore count as
+//!
+//! ```text
+//! Σ e² + w (Σ e)²
+//! ```
+//!
+//! The first term is the squared error under a light of independent elements, the second that under a uniform light.
+
+use std::array::from_fn;
+
+use super::colour::ColourVector;
+use super::tokens::MAX_MAGNITUDE;
+use crate::linalg::ascending_order;
+use crate::transport::CHANNELS;
+
+/// Added to a magnitude in steps before it is truncated. Less than a half: small values are mostly noise,
+/// whose bits reduce the error less than those of large ones.
+const ROUNDING_OFFSET: f32 = 0.2;
+/// The weight w of sums, and that in the first layer, which makes the first picture and which later layers correct.
+/// Larger weights make files larger, as finer steps have to make up for the errors of single values.
+pub const SUM_WEIGHT: f32 = 0.05;
+pub const FIRST_SUM_WEIGHT: f32 = 1.0;
+/// Cost of the bits of a number that was zero, in squared steps: a bit is worth 2 ln 2 / 12. Other numbers cost as much
+/// as before.
+const ZERO_COST: f32 = 0.7;
+/// Largest magnitude of a number that is rounded: another step may follow, and Co and Cg are up to twice as large.
+const MAX_ROUNDED: i32 = MAX_MAGNITUDE / 2 - 1;
+
+/// A slot of a function: its numbers in red, green and blue, and what rounding leaves of the values, in steps.
+#[derive(Clone, Copy, Debug)]
+pub struct RoundedSlot {
+    pub numbers: [i32; CHANNELS],
+    pub residual: ColourVector,
+}
+
+impl RoundedSlot {
+    /// Rounds values to multiples of a step.
+    pub fn new(tau: ColourVector, step: f32) -> Self {
+        let numbers = tau.map(|t| {
+            let steps = (t.abs() / step + ROUNDING_OFFSET) as i32; // `as` saturates
+            steps.min(MAX_ROUNDED) * if t < 0.0 { -1 } else { 1 }
+        });
+        Self {
+            numbers,
+            residual: from_fn(|c| tau[c] / step - numbers[c] as f32),
+        }
+    }
+}
+
+/// Changes some numbers of a function's slots by one step each, as far as a change reduces the sum of error and cost in
+/// bits, and as all numbers together still reduce the squared error of the values by more than the changes cost.
+pub fn restore_sums(slots: &mut [RoundedSlot], weight: f32) {
+    for c in 0..CHANNELS {
+        let (mut sum, mut reduction) = (0.0, 0.0);
+        for slot in slots.iter() {
+            let (number, residual) = (slot.numbers[c] as f32, slot.residual[c]);
+            sum += residual;
+            // By how much the number reduces the squared error, from (n + r)² to r².
+            reduction += number * (number + 2.0 * residual);
+        }
+        let sign = 1f32.copysign(sum);
+        let cost = |slot: &RoundedSlot| {
+            let bits = if slot.numbers[c] == 0 { ZERO_COST } else { 0.0 };
+            // The squared error increases from r² to (r - sign)².
+            1.0 - 2.0 * sign * slot.residual[c] + bits
+        };
+        for i in ascending_order(slots.iter().map(|slot| cost(slot).into())) {
+            let cost = cost(&slots[i]);
+            reduction -= cost;
+            if cost >= weight * (2.0 * sign * sum - 1.0) || reduction < 0.0 {
+                break;
+            }
+            slots[i].numbers[c] += sign as i32;
+            sum -= sign;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rounded(values: &[f32]) -> Vec<RoundedSlot> {
+        let slot = |&value: &f32| RoundedSlot {
+            numbers: [value as i32; CHANNELS],
+            residual: [value.fract(); CHANNELS],
+        };
+        values.iter().map(slot).collect()
+    }
+
+    /// What the numbers of green leave of the values.
+    fn left<'a>(slots: &'a [RoundedSlot], values: &'a [f32]) -> impl Iterator<Item = f32> + 'a {
+        let pairs = slots.iter().zip(values);
+        pairs.map(|(slot, value)| value - slot.numbers[1] as f32)
+    }
+
+    #[test]
+    fn numbers_take_what_zeros_have_lost() {
+        for sign in [1.0, -1.0] {
+            let mut values = [0.2 * sign; 40];
+            values[..4].copy_from_slice(&[9.4, 5.1, 3.3, 2.2].map(|value| value * sign));
+            let slots = rounded(&values);
+            let sum = |slots: &[RoundedSlot]| left(slots, &values).sum::<f32>().abs();
+            let restored = |weight| {
+                let mut slots = slots.clone();
+                restore_sums(&mut slots, weight);
+                slots
+            };
+            let [little, much] = [SUM_WEIGHT, FIRST_SUM_WEIGHT].map(restored);
+            // By the numbers that there are.
+            assert!(little[4..].iter().all(|slot| slot.numbers == [0; CHANNELS]));
+            assert!(sum(&little) < sum(&slots) - 0.9, "{}", sum(&little));
+            assert!(sum(&much) < 0.5 * sum(&slots), "{}", sum(&much));
+        }
+    }
+
+    #[test]
+    fn each_number_changes_by_one_step_and_the_error_stays_below_that_of_zeros() {
+        let mut values = [0.3; 60];
+        values[..2].copy_from_slice(&[1.3, 1.3]);
+        let mut slots = rounded(&values);
+        restore_sums(&mut slots, 100.0);
+        let before = rounded(&values);
+        let change = |(a, b): (&RoundedSlot, &RoundedSlot)| (a.numbers[0] - b.numbers[0]).abs();
+        let changes = slots.iter().zip(&before).map(change);
+        assert_eq!(changes.max(), Some(1));
+        let error: f32 = left(&slots, &values).map(|error| error * error).sum();
+        let zeros: f32 = values.iter().map(|value| value * value).sum();
+        assert!(error <= zeros, "{error} {zeros}");
+    }
+
+    #[test]
+    fn functions_without_loss_are_left() {
+        let exact = [7.0, -3.0, 0.3, -0.3, 0.0];
+        let mut slots = rounded(&exact);
+        restore_sums(&mut slots, 1.0);
+        for (slot, value) in slots.iter().zip(exact) {
+            assert_eq!(slot.numbers, [value as i32; CHANNELS]);
+        }
+    }
+
+    #[test]
+    fn values_beyond_all_numbers_get_the_largest() {
+        let values = [1.0, -1.0, f32::MAX];
+        let mut slots = vec![RoundedSlot::new(values, 1e-9); 3];
+        restore_sums(&mut slots, 1.0);
+        for slot in slots {
+            assert_eq!(
+                slot.numbers,
+                [1, -1, 1].map(|sign| sign * (MAX_ROUNDED + 1))
+            );
+        }
+    }
+}
