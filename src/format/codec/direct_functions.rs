@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::colour::{ColourVector, finite, ycocg_forward};
 use super::scan_functions::ScanFunctions;
-use super::sum_rounding::{FIRST_SUM_WEIGHT, RoundedSlot, SUM_WEIGHT, restore_sums};
+use super::sum_rounding::{RoundedSlot, restore_sums, sum_weight};
 use super::tokens::{EncodableRuns, EntropyTokenReader, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
 use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
@@ -153,10 +153,11 @@ impl QuantisedDirectFunctions {
         let mut residual = CentreOutDirectFunctions::new(functions, order).values;
         let mut numbers = vec![Vec::new(); scans.len()];
         let mut errors = vec![0.0; scans.len() + 1];
+        let direct = scans.iter().rfind(|scan| scan.coding.is_direct());
+        let last_step = direct.map_or(1.0, |scan| scan.step);
         for function in residual.chunks_exact_mut(order.len()) {
             errors[0] += square(function);
             let mut outputs = numbers.iter_mut().zip(&mut errors[1..]);
-            let mut weight = FIRST_SUM_WEIGHT;
             // Scans of one step that follow each other without gaps are rounded together.
             let is_joined = |a: &ProgressiveScan, b: &ProgressiveScan| {
                 (a.coding, a.step, a.end()) == (b.coding, b.step, b.items().start)
@@ -167,8 +168,7 @@ impl QuantisedDirectFunctions {
                 if layer[0].coding.is_direct() {
                     let values = &function[first..layer[layer.len() - 1].end()];
                     slots.extend(values.iter().map(|tau| RoundedSlot::new(*tau, step)));
-                    restore_sums(&mut slots, weight);
-                    weight = SUM_WEIGHT;
+                    restore_sums(&mut slots, sum_weight(step / last_step));
                 }
                 let mut slots = slots.into_iter();
                 for (scan, (numbers, error)) in layer.iter().zip(&mut outputs) {

@@ -20,10 +20,11 @@ use crate::transport::CHANNELS;
 /// Added to a magnitude in steps before it is truncated. Less than a half: small values are mostly noise,
 /// whose bits reduce the error less than those of large ones.
 const ROUNDING_OFFSET: f32 = 0.2;
-/// The weight w of sums, and that in the first layer, which makes the first picture and which later layers correct.
-/// Larger weights make files larger, as finer steps have to make up for the errors of single values.
-pub const SUM_WEIGHT: f32 = 0.05;
-pub const FIRST_SUM_WEIGHT: f32 = 1.0;
+/// The weight w of sums in the last layer. Larger weights make files larger, as finer steps have to make up for the
+/// errors of single values.
+const SUM_WEIGHT: f32 = 0.05;
+/// The largest weight in earlier layers, which make pictures before the last has come.
+const MAX_SUM_WEIGHT: f32 = 1.0;
 /// Cost of the bits of a number that was zero, in squared steps: a bit is worth 2 ln 2 / 12. Other numbers cost as much
 /// as before.
 const ZERO_COST: f32 = 0.7;
@@ -35,6 +36,12 @@ const MAX_ROUNDED: i32 = MAX_MAGNITUDE / 2 - 1;
 pub struct RoundedSlot {
     pub numbers: [i32; CHANNELS],
     pub residual: ColourVector,
+}
+
+/// The weight of sums in a layer whose step is `step_ratio` times the last layer's: the more later layers correct single
+/// values, the more the sums count.
+pub fn sum_weight(step_ratio: f32) -> f32 {
+    (SUM_WEIGHT * step_ratio * step_ratio).min(MAX_SUM_WEIGHT)
 }
 
 impl RoundedSlot {
@@ -110,7 +117,7 @@ mod tests {
                 restore_sums(&mut slots, weight);
                 slots
             };
-            let [little, much] = [SUM_WEIGHT, FIRST_SUM_WEIGHT].map(restored);
+            let [little, much] = [1.0, 16.0].map(|ratio| restored(sum_weight(ratio)));
             // By the numbers that there are.
             assert!(little[4..].iter().all(|slot| slot.numbers == [0; CHANNELS]));
             assert!(sum(&little) < sum(&slots) - 0.9, "{}", sum(&little));
