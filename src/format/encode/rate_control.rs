@@ -38,6 +38,9 @@ const MIN_STEP_RATIO: f32 = 0.99;
 const MAX_STEP_RATIO: f32 = 1.05;
 /// Factors of the planned shares in new plans for a file that exceeds [`MAX_SHARES`].
 const RETRY_SHARE_FACTORS: [f64; 2] = [0.75, 0.5];
+/// Bytes of metadata that shares of a file are counted with, so that transport is coded the same whatever is written
+/// about it. The command line writes about 800.
+const USUAL_METADATA_BYTES: u64 = 1024;
 
 impl EncodedFile {
     /// Encodes a whole file. The result does not depend on the number of threads.
@@ -150,7 +153,7 @@ impl<'a, E: Executor> RateController<'a, E> {
         let (mut file, mut is_within) = encode(1.0)?;
         for factor in RETRY_SHARE_FACTORS {
             // A reader fetches small files at once.
-            if is_within || bytes_without_metadata(&file) <= FIRST_BYTES {
+            if is_within || usual_bytes(&file, file.bytes()) <= FIRST_BYTES {
                 break;
             }
             (file, is_within) = encode(factor)?;
@@ -205,25 +208,21 @@ impl<'a, E: Executor> RateController<'a, E> {
 }
 
 /// Whether the index with the first `first_scans` scans, and every later scan, keep [`MAX_SHARES`] of the file.
-/// Metadata do not count, so that transport is coded the same whatever is written about it.
 fn is_within_shares(file: &EncodedFile, first_scans: usize) -> bool {
     let index = file.index();
-    let file_bytes = bytes_without_metadata(file);
-    let share = |bytes: u64| bytes as f64 / file_bytes as f64;
+    let file_bytes = usual_bytes(file, file.bytes()) as f64;
+    let share = |bytes: u64| bytes as f64 / file_bytes;
     let scan_range = |scan: usize| index.scan_range(scan);
-    let first_bytes = scan_range(first_scans - 1).end - metadata_bytes(file);
+    let first_bytes = usual_bytes(file, scan_range(first_scans - 1).end);
     share(first_bytes) <= MAX_SHARES.first
         && (first_scans..index.scans.len())
             .map(scan_range)
             .all(|range| share(range.end - range.start) <= MAX_SHARES.scan)
 }
 
-fn bytes_without_metadata(file: &EncodedFile) -> u64 {
-    file.bytes() - metadata_bytes(file)
-}
-
-fn metadata_bytes(file: &EncodedFile) -> u64 {
-    u64::from(file.index().header.metadata.bytes)
+/// The first `bytes` of a file, if it had metadata of [`USUAL_METADATA_BYTES`].
+fn usual_bytes(file: &EncodedFile, bytes: u64) -> u64 {
+    bytes - u64::from(file.index().header.metadata.bytes) + USUAL_METADATA_BYTES
 }
 
 /// The metric's tiles in the file's coding: as direct functions where the file has no components.
