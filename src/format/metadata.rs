@@ -68,7 +68,9 @@ pub struct MetadataText(String);
 impl MetadataText {
     /// The JSON of `metadata`.
     pub(crate) fn encode(metadata: &Metadata) -> Result<Self, FormatError> {
-        let mut json = serde_json::to_string(metadata).map_err(invalid)?;
+        // Strings, numbers and JSON values never fail, and serde's messages would make the recovery module larger.
+        let mut json =
+            serde_json::to_string(metadata).map_err(|_| invalid("it cannot be written as JSON"))?;
         if let Some(matrix) = &metadata.color_matrix {
             let matrix = color_matrix_json(matrix);
             // Other fields follow, as some are always written.
