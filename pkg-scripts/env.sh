@@ -19,11 +19,11 @@ export PATH
 # Every worker has a stack of its own: a quarter of the linker's default is enough.
 WASM_FLAGS="-C link-arg=-zstack-size=262144"
 # Modules keep the paths of sources for messages: those of crates without the folders of the machine that compiled them.
-registry=${CARGO_HOME:-$HOME/.cargo}/registry/src
-# Flags are separated by spaces.
-case $registry in
+# Flags are separated by spaces, so that a folder with one stays in the modules.
+CRATE_SOURCES=${CARGO_HOME:-$HOME/.cargo}/registry/src
+case $CRATE_SOURCES in
 *[[:space:]]*) ;;
-*) WASM_FLAGS+=" --remap-path-prefix=$registry=" ;;
+*) WASM_FLAGS+=" --remap-path-prefix=$CRATE_SOURCES=" ;;
 esac
 
 first_command() {

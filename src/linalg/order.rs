@@ -1,4 +1,4 @@
-//! Sorting. All lists of recovery go through one function: each other comparison would add to its module.
+//! Sorting. All lists of recovery and of the encoder go through one function: each other comparison would add to its module.
 
 use std::collections::BinaryHeap;
 

@@ -49,6 +49,7 @@ impl<'a, const N: usize> PassiveSet<'a, N> {
     /// # Panics
     /// If `gram` does not have `k²` entries.
     pub fn new(gram: &'a [f64], k: usize) -> Self {
+        // Not `assert_eq`, whose formatting code modules would have to carry.
         assert!(gram.len() == k * k, "the Gram matrix is square");
         let stride = padded_len(k.min(INITIAL_CAPACITY));
         Self {

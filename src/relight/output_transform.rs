@@ -206,6 +206,7 @@ impl TabulatedOutputTransform {
     /// # Panics
     /// If `out` has another length than `linear`.
     pub fn encode(&self, linear: &[[f32; CHANNELS]], at: CameraPixel, out: &mut [[u8; 4]]) {
+        // Not `assert_eq`, whose formatting code modules would have to carry.
         assert!(linear.len() == out.len(), "as many codes as pixels");
         // In units of 1/256; 128 rounds.
         let thresholds: [u32; 8] = std::array::from_fn(|i| match self.dither {

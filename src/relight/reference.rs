@@ -9,6 +9,7 @@ use crate::transport::{CHANNELS, CameraPixel, LightElement, Transport, entry_slo
 /// If the light's extent is not the transport's.
 pub fn relight(transport: &Transport, light: &Light) -> Vec<[f64; CHANNELS]> {
     let geometry = &transport.geometry;
+    // Not `assert_eq`, whose formatting code modules would have to carry.
     assert!(light.extent() == geometry.light, "extent of the light");
     let (area, rank) = (geometry.window.area(), transport.basis.rank());
     let emission = |element: LightElement| -> [f64; CHANNELS] {

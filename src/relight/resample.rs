@@ -12,6 +12,7 @@ use crate::transport::Extent;
 /// # Panics
 /// If `values` does not have the length of `from`.
 pub fn area_resample(values: &[f32], from: Extent, to: Extent) -> Vec<f32> {
+    // Not `assert_eq`, whose formatting code modules would have to carry.
     assert!(values.len() == from.area() * 3, "three values a pixel");
     let mut resampler = AreaResampler::new(from, to);
     for row in values.chunks_exact(3 * from.width as usize) {

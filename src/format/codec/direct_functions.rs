@@ -2,14 +2,14 @@
 //!
 //! Slots come in centre-out order, as functions peak near the window's centre: slots far away are mostly
 //! zero, and zeros to the end of a run are one token. Red, green and blue of a slot are rounded to multiples
-//! of the scan's step, then transformed to Y, Co, Cg. A chunk is one token string with a run
+//! of the scan's step, so that sums over slots are kept (`sum_rounding`), then transformed to Y, Co, Cg. A chunk is one token string with a run
 //! `[item, Y Co Cg]` for each pixel. Scans add up.
 
 use std::ops::Range;
 
 use super::colour::{ColourVector, finite, ycocg_forward};
 use super::scan_functions::ScanFunctions;
-use super::sum_rounding::{RoundedSlot, restore_sums, sum_weight};
+use super::sum_rounding::{MAX_ROUNDED, RoundedSlot, restore_sums, sum_weight};
 use super::tokens::{EncodableRuns, EntropyTokenReader, MAX_MAGNITUDE, QuantisedRun, TokenWriter};
 use crate::format::chunk::EncodedChunk;
 use crate::format::constants::MAX_CONTENT_BYTES;
@@ -56,7 +56,7 @@ pub fn max_slots(tile_side: u32) -> u64 {
 
 /// The finest step that keeps the numbers of values up to `peak` within [`MAX_MAGNITUDE`].
 pub fn finest_step(peak: f32) -> f32 {
-    2.0 * peak / MAX_MAGNITUDE as f32
+    peak / MAX_ROUNDED as f32
 }
 
 /// Reads a tile's chunk of `scan`, which has `tokens` tokens, into `functions`.
@@ -112,6 +112,7 @@ impl CentreOutDirectFunctions {
     }
 }
 
+/// Rounds without keeping sums, which makes a first layer larger: the rate control compares the file with its plan.
 impl EncodableRuns for CentreOutDirectFunctions {
     fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>)) {
         let (mut residuals, mut numbers) = (Vec::new(), Vec::new());
@@ -168,7 +169,10 @@ impl QuantisedDirectFunctions {
                 if layer[0].coding.is_direct() {
                     let values = &function[first..layer[layer.len() - 1].end()];
                     slots.extend(values.iter().map(|tau| RoundedSlot::new(*tau, step)));
-                    restore_sums(&mut slots, sum_weight(step / last_step));
+                    // Beyond that, another step could overflow.
+                    if step < f32::MAX / MAX_MAGNITUDE as f32 {
+                        restore_sums(&mut slots, sum_weight(step / last_step));
+                    }
                 }
                 let mut slots = slots.into_iter();
                 for (scan, (numbers, error)) in layer.iter().zip(&mut outputs) {
@@ -327,22 +331,22 @@ mod tests {
             scans.extend(layer);
             QuantisedDirectFunctions::new(&functions, &order, &scans).residual
         };
-        let residual = quantised(&[0, 25]);
-        assert_eq!(residual, quantised(&[0, 3, 12, 25]));
-        let sums = |of: &dyn Fn(&ColourVector) -> f32| -> f32 {
-            let pixels = residual.chunks_exact(25);
-            pixels
-                .map(|residual| residual.iter().map(of).sum::<f32>().abs())
-                .sum()
+        let restored = quantised(&[0, 25]);
+        assert_eq!(restored, quantised(&[0, 3, 12, 25]));
+        // Both layers without restoring sums.
+        let mut rounded = CentreOutDirectFunctions::new(&functions, &order).values;
+        for function in rounded.chunks_exact_mut(25) {
+            for (count, step) in [(10, 8.0 * step), (25, step)] {
+                for tau in &mut function[..count] {
+                    *tau = RoundedSlot::new(*tau, step).residual.map(|r| r * step);
+                }
+            }
+        }
+        let sums = |residual: &[ColourVector]| -> f32 {
+            let sum = |function: &[ColourVector]| function.iter().map(|tau| tau[1]).sum::<f32>();
+            residual.chunks_exact(25).map(|f| sum(f).abs()).sum()
         };
-        let rounded: f32 = functions
-            .chunks_exact(25)
-            .map(|function| {
-                let slots = function.iter().map(|tau| RoundedSlot::new(*tau, step));
-                slots.map(|slot| slot.residual[1] * step).sum::<f32>().abs()
-            })
-            .sum();
-        let restored = sums(&|tau| tau[1]);
+        let (restored, rounded) = (sums(&restored), sums(&rounded));
         assert!(restored < 0.8 * rounded, "{restored} {rounded}");
     }
 

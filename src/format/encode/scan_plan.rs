@@ -21,7 +21,7 @@ use crate::format::error::FormatError;
 use crate::format::scan::{ProgressiveScan, ScanCoding, rank_of};
 use crate::job_executor::Executor;
 
-/// The shares that a plan aims for. Predictions err; files keep [`MAX_SHARES`].
+/// The shares that a plan aims for. Predictions err: files keep [`MAX_SHARES`].
 pub const SHARES: ByteShareLimits = ByteShareLimits {
     first: 0.08,
     scan: 0.18,
@@ -31,7 +31,7 @@ const SMALL_FILE_SHARES: ByteShareLimits = ByteShareLimits {
     first: 0.3,
     scan: f64::INFINITY,
 };
-/// The shares that files keep: a tenth and a quarter.
+/// The shares that files of usual metadata keep: a tenth and a quarter.
 pub const MAX_SHARES: ByteShareLimits = ByteShareLimits {
     first: 0.1,
     scan: 0.25,
