@@ -10,6 +10,8 @@
 mod banded;
 mod cholesky;
 mod cosine;
+#[cfg(feature = "simulate")]
+mod cubic_convolution;
 mod eigen;
 mod kernels;
 mod matrix;
@@ -21,6 +23,8 @@ mod vectorise;
 pub(crate) use banded::BandedMatrix;
 pub(crate) use cholesky::{cholesky, cholesky_inverse, cholesky_solve, cholesky_with_ridge};
 pub(crate) use cosine::cos_pi;
+#[cfg(feature = "simulate")]
+pub(crate) use cubic_convolution::cubic_convolution_weights;
 pub(crate) use eigen::{symmetric_eigen, symmetric_eigenvalues};
 pub(crate) use kernels::{
     BLOCK_SLOTS, LANES, add_outer_block, add_products, add_scaled, combine_blocks, combine_slots,

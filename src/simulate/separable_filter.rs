@@ -1,6 +1,7 @@
 //! Filters of pictures along rows, then along columns. The border repeats.
 
 use crate::capture::LinearPhoto;
+use crate::linalg::cubic_convolution_weights;
 use crate::transport::Extent;
 
 /// An offset along an axis, and the weight of the sample there.
@@ -13,7 +14,9 @@ const MIN_GAUSSIAN_RADIUS: f64 = 3.0;
 pub(super) fn shifted(picture: &LinearPhoto, camera: Extent, shift: [f64; 2]) -> LinearPhoto {
     let taps = shift.map(|d| {
         let cell = (-d).floor();
-        [-1.0, 0.0, 1.0, 2.0].map(|k| ((cell + k) as i64, keys(-d - cell - k)))
+        let offsets = (cell as i64 - 1)..;
+        let weights = cubic_convolution_weights(-d - cell);
+        offsets.zip(weights).collect::<Vec<Tap>>()
     });
     filtered(picture, camera, [&taps[0], &taps[1]])
 }
@@ -61,15 +64,6 @@ fn filtered_lines<const C: usize>(
         }
     }
     filtered
-}
-
-/// The kernel of cubic convolution.
-fn keys(x: f64) -> f64 {
-    match x.abs() {
-        x if x < 1.0 => 1.5 * x.powi(3) - 2.5 * x * x + 1.0,
-        x if x < 2.0 => -0.5 * x.powi(3) + 2.5 * x * x - 4.0 * x + 2.0,
-        _ => 0.0,
-    }
 }
 
 #[cfg(test)]

@@ -125,6 +125,28 @@ fn wrong_input_is_named_with_its_remedy() {
         ),
         (
             &[
+                "assemble",
+                &sequence,
+                "--photos",
+                &photos,
+                "--undistort",
+                "60,60,200,24,-0.1",
+            ],
+            "has 48x48 pixels, but the centre of --undistort is (200, 24)",
+        ),
+        (
+            &[
+                "assemble",
+                &sequence,
+                "--photos",
+                &photos,
+                "--undistort",
+                "60,60",
+            ],
+            "as OpenCV's calibrateCamera does",
+        ),
+        (
+            &[
                 "assemble", &sequence, "--photos", &photos, "--black", "9", "--white", "9",
             ],
             "--white must be above --black",
@@ -260,6 +282,33 @@ fn photographs_of_other_types_are_read() {
         (middle[1].as_f64().unwrap() - 0.2195).abs() < 0.01,
         "{middle}"
     );
+}
+
+#[test]
+fn the_distortion_of_a_lens_is_undone() {
+    let session = Session::simulated(
+        &["--camera", "96x96", "--distortion", "10"],
+        "96x96",
+        "200x150",
+        "4",
+    );
+    // The simulated lens in OpenCV's terms: the focal length is the distance of the corners from the centre.
+    let lens = "67.882,67.882,47.5,47.5,-0.11111,0.03704,0,0,-0.01646";
+    let residual = |undistort: &[&str]| {
+        let assembled = session.assemble(undistort);
+        assert!(assembled.status.success(), "{}", stderr_text(&assembled));
+        let sequence = session.text("sequence");
+        let report = succeed(&["calibrate", &sequence, "--force", "--json"]).stdout;
+        let report: Value = serde_json::from_slice(&report).unwrap();
+        for name in ["photos", "graycode"] {
+            fs::remove_dir_all(session.path("sequence").join(name)).unwrap();
+        }
+        fs::remove_file(session.path("sequence/capture.json")).unwrap();
+        report["affine_residual"]["percentile_95"].as_f64().unwrap()
+    };
+    let (bent, straight) = (residual(&[]), residual(&["--undistort", lens]));
+    // Scattering leaves three quarters of it.
+    assert!(straight < 0.85 * bent, "{straight} {bent}");
 }
 
 /// The tray of cookies hardly scatters.

@@ -38,14 +38,19 @@ impl Session {
 
     /// Of so many light elements, display pixels and patterns.
     pub fn of(light: &str, screen: &str, patterns: &str) -> Self {
+        Self::simulated(&["--camera", "48x48"], light, screen, patterns)
+    }
+
+    /// With options of the simulation, of so many light elements, display pixels and patterns.
+    pub fn simulated(simulation: &[&str], light: &str, screen: &str, patterns: &str) -> Self {
         let session = Self {
             folder: TempDir::new().unwrap(),
         };
         let [object, sequence, photos] =
             ["object", "sequence", "photos"].map(|name| session.text(name));
         let simulate = ["simulate", "stained-glass", "-o", &object];
-        let size = ["--camera", "48x48", "--light", light, "--patterns", "1"];
-        succeed(&[&simulate[..], &size].concat());
+        let size = ["--light", light, "--patterns", "1"];
+        succeed(&[&simulate[..], &size, simulation].concat());
         let display = ["--screen", screen, "--light", light, "--patterns", patterns];
         succeed(&[&["patterns", "-o", &sequence], &display[..]].concat());
         let photograph = ["photograph", &object, "--sequence", &sequence];

@@ -2,6 +2,7 @@
 
 mod color_matrix;
 mod develop_all;
+mod lens_distortion;
 mod level_warnings;
 mod line_sharpness;
 mod photograph_file;
@@ -17,6 +18,7 @@ use tempfile::TempDir;
 
 pub use self::color_matrix::raw_color_matrix;
 pub use self::develop_all::{check_cancelled, develop_all};
+use self::lens_distortion::LensDistortion;
 pub use self::level_warnings::{PhotographLevels, warn_of_clipping};
 pub use self::photograph_file::{
     DevelopSettings, DevelopedPhotograph, SampleKind, develop, thumbnail_part,
@@ -68,6 +70,13 @@ pub struct DevelopArgs {
     /// Average squares of N x N pixels; a raw file has one pixel for each 2 x 2 of the sensor
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     bin: u32,
+    /// Undo the distortion of a lens, given as OpenCV's calibrateCamera does, in pixels of the photographs; K2 to K3 may be left out
+    #[arg(
+        long,
+        value_name = "FX,FY,CX,CY,K1,K2,P1,P2,K3",
+        allow_hyphen_values = true
+    )]
+    undistort: Option<LensDistortion>,
     /// Keep a part of the picture, in pixels before averaging
     #[arg(long, value_name = "X,Y,WxH", value_parser = parse_rect)]
     crop: Option<TileRect>,
@@ -91,6 +100,7 @@ impl DevelopArgs {
             black: self.black,
             white: self.white,
             bin: self.bin,
+            undistort: self.undistort,
             crop: self.crop,
             rotate: self.rotate.unwrap_or(Rotation::NONE),
         })

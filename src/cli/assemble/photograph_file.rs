@@ -8,6 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
+use super::lens_distortion::{LensDistortion, Tap};
 use super::photograph_list::{is_picture, is_raw};
 use super::rotation::Rotation;
 use crate::capture::{CameraResponse, ManifestCamera};
@@ -76,6 +77,9 @@ pub struct DevelopSettings {
     pub white: Option<f64>,
     /// Side of the squares of pixels that are averaged.
     pub bin: u32,
+    /// The lens whose distortion is undone, before a part is kept.
+    #[serde(default)]
+    pub undistort: Option<LensDistortion>,
     /// The part of the picture that is kept, in pixels before averaging.
     pub crop: Option<TileRect>,
     /// How the part that is kept is turned.
@@ -220,19 +224,31 @@ fn develop_samples(
         let (x, y) = settings.rotate.source(rect.extent, x, y);
         (rect.x + x, rect.y + y)
     };
-    let sample = |x: u32, y: u32| {
-        let (x, y) = place(x, y);
-        samples.pixel(x, y)
-    };
-    let averaged = match development.average(settings.rotate.extent(rect.extent), sample) {
-        Ok(averaged) => averaged,
-        Err(NotANumber { x, y }) => {
-            let (x, y) = place(x, y);
-            bail!(
-                "has a sample at ({x}, {y}) that is not a number, or minus infinity; export it again, or write 0 for pixels that the \
-                 converter cannot compute"
-            )
+    let extent = settings.rotate.extent(rect.extent);
+    let sample = |x: u32, y: u32| samples.pixel(x, y);
+    let averaged = match &settings.undistort {
+        None => {
+            let taps = |x: u32, y: u32| {
+                let (x, y) = place(x, y);
+                [Tap::whole(x, y)]
+            };
+            development.average(extent, taps, sample)
         }
+        Some(lens) => {
+            lens.check(samples.extent())?;
+            let taps = |x: u32, y: u32| {
+                let (x, y) = place(x, y);
+                lens.taps(samples.extent(), x, y)
+            };
+            development.average(extent, taps, sample)
+        }
+    };
+    let averaged = match averaged {
+        Ok(averaged) => averaged,
+        Err(NotANumber { x, y }) => bail!(
+            "has a sample at ({x}, {y}) that is not a number, or minus infinity; export it again, or write 0 for pixels that the \
+             converter cannot compute"
+        ),
     };
     let count = (averaged.codes.len() * CHANNELS) as f64;
     let pile = averaged.pile(stored);
@@ -330,7 +346,7 @@ struct AveragedPhotograph {
     thumbnail: Vec<f64>,
     saturated: usize,
     clipped: usize,
-    /// Number of pixels before averaging.
+    /// Number of pixels that were read, some more than once.
     pixels: usize,
     largest: [LargestSample; CHANNELS],
 }
@@ -349,11 +365,12 @@ impl AveragedPhotograph {
 }
 
 impl Development {
-    /// Linearises samples and averages squares of them; `sample` is that of a pixel before averaging. Samples at white or
-    /// above, infinity included, are saturated, and so is every square that has one.
-    fn average(
+    /// Linearises samples and averages squares of pixels of a picture, each of which is the sum of its `taps`; `sample` gives those
+    /// of the photograph. Samples at white or above, infinity included, are saturated, and so is every square that has one.
+    fn average<T: IntoIterator<Item = Tap>>(
         &self,
         picture: Extent,
+        taps: impl Fn(u32, u32) -> T,
         sample: impl Fn(u32, u32) -> [f64; CHANNELS],
     ) -> Result<AveragedPhotograph, NotANumber> {
         let bin = self.bin;
@@ -361,22 +378,24 @@ impl Development {
         let mut codes = Vec::with_capacity(extent.area());
         let mut sums =
             vec![[0.0; 2]; thumbnail_part(extent, extent.width - 1, extent.height - 1) + 1];
-        let (mut saturated, mut clipped) = (0, 0);
+        let (mut saturated, mut clipped, mut pixels) = (0, 0, 0);
         let mut largest = [LargestSample::default(); CHANNELS];
         for (x, y) in extent.cells() {
             let mut total = [0.0; CHANNELS];
             let mut is_saturated = [false; CHANNELS];
             for (dx, dy) in Extent::new(bin, bin).cells() {
-                let (x, y) = (x * bin + dx, y * bin + dy);
-                let sample = sample(x, y);
-                for c in 0..CHANNELS {
-                    if sample[c].is_nan() || sample[c] == f64::NEG_INFINITY {
-                        return Err(NotANumber { x, y });
+                for Tap { x, y, weight } in taps(x * bin + dx, y * bin + dy) {
+                    pixels += 1;
+                    let sample = sample(x, y);
+                    for c in 0..CHANNELS {
+                        if sample[c].is_nan() || sample[c] == f64::NEG_INFINITY {
+                            return Err(NotANumber { x, y });
+                        }
+                        largest[c].add(sample[c]);
+                        is_saturated[c] |= sample[c] >= self.stored.white;
+                        let share = self.stored.share(sample[c].min(self.stored.white));
+                        total[c] += weight * self.response.linearise(share);
                     }
-                    largest[c].add(sample[c]);
-                    is_saturated[c] |= sample[c] >= self.stored.white;
-                    let share = self.stored.share(sample[c].min(self.stored.white));
-                    total[c] += self.response.linearise(share);
                 }
             }
             let part = thumbnail_part(extent, x, y);
@@ -399,7 +418,7 @@ impl Development {
             codes,
             saturated,
             clipped,
-            pixels: picture.area(),
+            pixels,
             largest,
         })
     }
@@ -414,6 +433,7 @@ mod tests {
         black: Some(500.0),
         white: Some(60_000.0),
         bin: 2,
+        undistort: None,
         crop: None,
         rotate: Rotation::NONE,
     };
@@ -428,6 +448,29 @@ mod tests {
         }
     }
 
+    fn whole(x: u32, y: u32) -> [Tap; 1] {
+        [Tap::whole(x, y)]
+    }
+
+    #[test]
+    fn pixels_are_sums_of_taps_and_saturated_with_one_of_them() {
+        let settings = DevelopSettings { bin: 1, ..SETTINGS };
+        let development = development(&settings, SampleKind::Integer);
+        let taps = |x: u32, y: u32| {
+            let taps = [(x, 0.75), (x + 1, 0.25)].map(|(x, weight)| Tap { x, y, weight });
+            taps.into_iter().take(if x < 3 { 2 } else { 0 })
+        };
+        let samples = [1000.0, 2000.0, 4000.0, 60_000.0];
+        let sample = |x: u32, _: u32| [samples[x as usize]; CHANNELS];
+        let photo = development
+            .average(Extent::new(4, 1), taps, sample)
+            .unwrap();
+        let codes: Vec<u16> = photo.codes.iter().map(|code| code[0]).collect();
+        // The last has no taps, and is black.
+        assert_eq!(codes, [1250, 2500, MAX_CODE, 500]);
+        assert_eq!(photo.pixels, 6);
+    }
+
     #[test]
     fn squares_of_pixels_are_averaged_and_saturation_is_kept() {
         let sample = |x: u32, y: u32| match (x, y) {
@@ -435,7 +478,9 @@ mod tests {
             (x, _) => [1000.0 + 100.0 * f64::from(x); CHANNELS],
         };
         let development = development(&SETTINGS, SampleKind::Integer);
-        let photo = development.average(Extent::new(4, 2), sample).unwrap();
+        let photo = development
+            .average(Extent::new(4, 2), whole, sample)
+            .unwrap();
         assert_eq!(photo.codes, [[1050; 3], [MAX_CODE, 1175, 1175]]);
         assert_eq!((photo.saturated, photo.clipped), (1, 0));
         assert_eq!(development.written, development.stored);
@@ -453,7 +498,7 @@ mod tests {
         };
         let sample = |x: u32, _: u32| if x == 0 { [0.0; 3] } else { [32_768.0; 3] };
         let photo = development(&settings, SampleKind::EightBit);
-        let photo = photo.average(Extent::new(2, 2), sample).unwrap();
+        let photo = photo.average(Extent::new(2, 2), whole, sample).unwrap();
         // Half of a quarter of white.
         assert!(photo.codes[0][0].abs_diff(8192) <= 1, "{:?}", photo.codes);
     }
@@ -469,7 +514,9 @@ mod tests {
         let development = development(&settings, SampleKind::Float);
         let values = [-0.05, 0.0, 1.0, f64::INFINITY, -1.0];
         let sample = |x: u32, _: u32| [values[x as usize]; CHANNELS];
-        let photo = development.average(Extent::new(5, 1), sample).unwrap();
+        let photo = development
+            .average(Extent::new(5, 1), whole, sample)
+            .unwrap();
         let codes: Vec<u16> = photo.codes.iter().map(|code| code[0]).collect();
         // White is 63487 codes above black.
         assert_eq!(codes, [1254, 2048, 17_920, MAX_CODE, 0]);
@@ -477,7 +524,7 @@ mod tests {
         assert!(photo.thumbnail.iter().all(|mean| mean.is_finite()));
         for invalid in [f64::NAN, f64::NEG_INFINITY] {
             let sample = |x: u32, _: u32| [0.0, 0.0, if x == 3 { invalid } else { 0.0 }];
-            let refused = development.average(Extent::new(5, 1), sample);
+            let refused = development.average(Extent::new(5, 1), whole, sample);
             assert_eq!(refused, Err(NotANumber { x: 3, y: 0 }));
         }
     }
@@ -489,7 +536,7 @@ mod tests {
         let extent = Extent::new(100, 1);
         let pile = |largest: f64| {
             let sample = |x: u32, _: u32| [100.0, (1000.0 * f64::from(x)).min(largest), 60_000.0];
-            let photo = development.average(extent, sample).unwrap();
+            let photo = development.average(extent, whole, sample).unwrap();
             photo.pile(development.stored)
         };
         assert_eq!(pile(50_000.0), Some(50_000.0));

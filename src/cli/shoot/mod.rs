@@ -201,6 +201,12 @@ fn check_settings(
         ("--black", was.black != is.black, format!("{:?}", was.black)),
         ("--white", was.white != is.white, format!("{:?}", was.white)),
         ("--bin", was.bin != is.bin, was.bin.to_string()),
+        (
+            "--undistort",
+            was.undistort != is.undistort,
+            was.undistort
+                .map_or_else(|| "none".to_owned(), |lens| lens.to_string()),
+        ),
         ("--crop", was.crop != is.crop, format!("{:?}", was.crop)),
         (
             "--rotate",
