@@ -95,11 +95,6 @@ struct Levels {
 }
 
 impl Levels {
-    /// A number as a share of white.
-    fn share(self, number: f64) -> f64 {
-        (number - self.black) / (self.white - self.black)
-    }
-
     fn number(self, share: f64) -> f64 {
         self.black + share * (self.white - self.black)
     }
@@ -374,6 +369,8 @@ impl Development {
         sample: impl Fn(u32, u32) -> [f64; CHANNELS],
     ) -> Result<AveragedPhotograph, NotANumber> {
         let bin = self.bin;
+        let Levels { black, white } = self.stored;
+        let scale = (white - black).recip();
         let extent = Extent::new(picture.width / bin, picture.height / bin);
         let mut codes = Vec::with_capacity(extent.area());
         let mut sums =
@@ -392,8 +389,8 @@ impl Development {
                             return Err(NotANumber { x, y });
                         }
                         largest[c].add(sample[c]);
-                        is_saturated[c] |= sample[c] >= self.stored.white;
-                        let share = self.stored.share(sample[c].min(self.stored.white));
+                        is_saturated[c] |= sample[c] >= white;
+                        let share = (sample[c].min(white) - black) * scale;
                         total[c] += weight * self.response.linearise(share);
                     }
                 }
