@@ -83,10 +83,11 @@ pub fn restore_sums(slots: &mut [RoundedSlot], weight: f32) {
             1.0 - 2.0 * sign * slot.residual[c] + bits
         };
         // The gain falls with each change, so that no other slot will be worth its cost.
-        let candidates = slots.iter().map(cost).enumerate();
-        let candidates: Vec<_> = candidates.filter(|(_, cost)| *cost < gain(sum)).collect();
-        for k in ascending_order(candidates.iter().map(|(_, cost)| (*cost).into())) {
-            let (i, cost) = candidates[k];
+        let mut candidates: Vec<usize> = (0..slots.len()).collect();
+        candidates.retain(|&i| cost(&slots[i]) < gain(sum));
+        for k in ascending_order(candidates.iter().map(|&i| cost(&slots[i]).into())) {
+            let i = candidates[k];
+            let cost = cost(&slots[i]);
             reduction -= cost;
             if cost >= gain(sum) || reduction < 0.0 {
                 break;
