@@ -67,7 +67,7 @@ pub struct PhotoSamples {
 impl PhotoSamples {
     /// A photograph of `channels` values a pixel: grey, grey and alpha, RGB, or RGB and more. They lie pixel by pixel, or plane
     /// by plane if `is_planar`. `None` if there are not as many values as the extent says, or none at all.
-    pub(super) fn new(
+    pub(crate) fn new(
         extent: Extent,
         values: SampleValues,
         channels: usize,

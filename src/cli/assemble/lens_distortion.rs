@@ -12,19 +12,23 @@
 //! A pixel of the undistorted picture is interpolated there by cubic convolution.
 
 use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
 use anyhow::{Result, ensure};
 use serde::{Deserialize, Serialize};
 
 use crate::linalg::cubic_convolution_weights;
-use crate::transport::Extent;
+use crate::transport::{Extent, TileRect};
 
-/// Distances from the centre at which the model is checked, as shares of that of the farthest corner.
-const CHECKED_DISTANCES: u32 = 100;
+/// Where the centre of a lens lies, as shares of the picture's sides: that of a photograph of half or twice the size lies outside.
+const CENTRE_SHARES: Range<f64> = 0.3..0.7;
+/// Places along each side of a picture at which the model is checked.
+const CHECKED_PLACES: u32 = 33;
 
-/// A lens, by focal lengths, centre and coefficients of its distortion.
+/// A lens, by focal lengths, centre and coefficients of its distortion. Kept as text, from which all its numbers come back.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct LensDistortion {
     /// f_x and f_y, in pixels.
     focal: [f64; 2],
@@ -81,6 +85,20 @@ impl FromStr for LensDistortion {
     }
 }
 
+impl TryFrom<String> for LensDistortion {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<LensDistortion> for String {
+    fn from(lens: LensDistortion) -> Self {
+        lens.to_string()
+    }
+}
+
 impl fmt::Display for LensDistortion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ([fx, fy], [cx, cy]) = (self.focal, self.centre);
@@ -90,36 +108,43 @@ impl fmt::Display for LensDistortion {
 }
 
 impl LensDistortion {
-    /// Refuses a model that a photograph of this size cannot have.
-    pub fn check(&self, photograph: Extent) -> Result<()> {
+    /// Refuses a model that a photograph of this size cannot have, or that folds the `kept` part of the picture.
+    pub fn check(&self, photograph: Extent, kept: TileRect) -> Result<()> {
         let Extent { width, height } = photograph;
         let [cx, cy] = self.centre;
-        let contains = |c: f64, side: u32| (0.0..f64::from(side)).contains(&c);
+        let is_near_middle = |c: f64, side: u32| CENTRE_SHARES.contains(&(c / f64::from(side)));
         ensure!(
-            contains(cx, width) && contains(cy, height),
-            "has {width}x{height} pixels, but the centre of --undistort is ({cx}, {cy}); the numbers are those of photographs of \
-             another size"
+            is_near_middle(cx, width) && is_near_middle(cy, height),
+            "has {width}x{height} pixels, but the centre of --undistort is ({cx}, {cy}), far from the middle; calibrate with photographs of \
+             this size. From a size to half of it, as raw files have: half of FX and FY, (CX + 0.5) / 2 - 0.5, and so for CY"
         );
-        let corners = [0, width].map(|x| [0, height].map(|y| [f64::from(x), f64::from(y)]));
-        let squares = corners.as_flattened().iter().map(|corner| {
-            let [x, y] = self.direction(*corner);
-            x * x + y * y
-        });
-        let farthest = squares.fold(0.0, f64::max).sqrt();
-        let [k1, k2, k3] = self.radial;
-        // The derivative of the distance from the centre.
-        let rises = |distance: f64| {
-            let r2 = distance * distance;
-            1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) > 0.0
+        let place = |i: u32, from: u32, side: u32| {
+            f64::from(from) - 0.5 + f64::from(side) * f64::from(i) / f64::from(CHECKED_PLACES - 1)
         };
-        let distances =
-            (0..=CHECKED_DISTANCES).map(|i| f64::from(i) / f64::from(CHECKED_DISTANCES));
+        let places = Extent::new(CHECKED_PLACES, CHECKED_PLACES).cells();
+        let mut places = places.map(|(i, j)| {
+            let Extent { width, height } = kept.extent;
+            [place(i, kept.x, width), place(j, kept.y, height)]
+        });
         ensure!(
-            distances.map(|share| share * farthest).all(rises),
-            "has {width}x{height} pixels, over which --undistort folds the picture; focal lengths and centre must be in pixels of this \
-             photograph, and the coefficients in OpenCV's order"
+            places.all(|pixel| self.keeps_orientation(pixel)),
+            "has {width}x{height} pixels, of which --undistort folds some; focal lengths and centre must be in pixels of this photograph, \
+             the coefficients in OpenCV's order, and parts that the calibration has not seen need a --crop"
         );
         Ok(())
+    }
+
+    /// Whether the derivative of the distortion keeps orientation at a place of the undistorted picture.
+    fn keeps_orientation(&self, pixel: [f64; 2]) -> bool {
+        let [x, y] = self.direction(pixel);
+        let ([k1, k2, k3], [p1, p2]) = (self.radial, self.tangential);
+        let r2 = x * x + y * y;
+        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
+        let xx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
+        let yy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
+        let xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
+        xx + yy > 0.0 && xx * yy - xy * xy > 0.0
     }
 
     /// The samples of a photograph that pixel (x, y) of the undistorted picture is interpolated from: none, if it lies outside.
@@ -131,8 +156,9 @@ impl LensDistortion {
             let cell = at[i].floor();
             let weights = cubic_convolution_weights(at[i] - cell);
             // The border repeats.
-            let index = |k: usize| (cell as i64 + k as i64 - 1).clamp(0, i64::from(sides[i]) - 1);
-            [0, 1, 2, 3].map(|k| (index(k) as u32, weights[k]))
+            let last = f64::from(sides[i] - 1);
+            let index = |k: usize| (cell + k as f64 - 1.0).clamp(0.0, last) as u32;
+            [0, 1, 2, 3].map(|k| (index(k), weights[k]))
         });
         let [columns, rows] = axes;
         let rows = rows.into_iter().take(if is_inside { 4 } else { 0 });
@@ -252,8 +278,13 @@ mod tests {
 
     #[test]
     fn numbers_are_read_as_they_are_written() {
-        let text = "1200,1180,640,360,-0.21,0.07,0.001,-0.002,0.01";
+        let text = "1234.5678901234567,1180,640,360,-0.21,0.07000000000000003,0.001,-0.002,0.01";
         assert_eq!(lens(text).to_string(), text);
+        let json = serde_json::to_string(&lens(text)).unwrap();
+        assert_eq!(
+            serde_json::from_str::<LensDistortion>(&json).unwrap(),
+            lens(text)
+        );
     }
 
     #[test]
@@ -269,13 +300,42 @@ mod tests {
         ] {
             assert!(text.parse::<LensDistortion>().is_err(), "{text}");
         }
-        assert!(lens("50,50,29.5,19.5,-0.2").check(PHOTOGRAPH).is_ok());
+    }
+
+    #[test]
+    fn lenses_of_other_photographs_are_refused() {
+        let whole = TileRect {
+            x: 0,
+            y: 0,
+            extent: PHOTOGRAPH,
+        };
+        assert!(
+            lens("50,50,29.5,19.5,-0.2")
+                .check(PHOTOGRAPH, whole)
+                .is_ok()
+        );
         for (text, part) in [
-            ("50,50,290,190,-0.2", "another size"),
+            ("100,100,59.5,39.5,-0.2", "this size"),
+            ("25,25,14.5,9.5,-0.2", "this size"),
             ("5,5,29.5,19.5,-0.2", "folds"),
+            ("50,50,29.5,19.5,-0.1,0,5", "folds"),
+            ("50,50,29.5,19.5,1e300", "folds"),
         ] {
-            let error = lens(text).check(PHOTOGRAPH).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            let error = lens(text).check(PHOTOGRAPH, whole).unwrap_err().to_string();
+            assert!(error.contains(part), "{text}: {error}");
         }
+        // Places that a crop cuts off may be folded.
+        let folded = lens("20,20,29.5,19.5,-0.2");
+        assert!(folded.check(PHOTOGRAPH, whole).is_err());
+        let middle = TileRect {
+            x: 20,
+            y: 10,
+            extent: Extent::new(20, 20),
+        };
+        assert!(folded.check(PHOTOGRAPH, middle).is_ok());
+        assert_eq!(
+            lens("50,50,29.5,19.5,1e300").taps(PHOTOGRAPH, 0, 0).count(),
+            0
+        );
     }
 }

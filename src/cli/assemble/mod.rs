@@ -70,12 +70,9 @@ pub struct DevelopArgs {
     /// Average squares of N x N pixels; a raw file has one pixel for each 2 x 2 of the sensor
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     bin: u32,
-    /// Undo the distortion of a lens, given as OpenCV's calibrateCamera does, in pixels of the photographs; K2 to K3 may be left out
-    #[arg(
-        long,
-        value_name = "FX,FY,CX,CY,K1,K2,P1,P2,K3",
-        allow_hyphen_values = true
-    )]
+    /// Undo the distortion of a lens, given as OpenCV's calibrateCamera does, in pixels of the photographs, before --crop; the last four
+    /// numbers may be left out
+    #[arg(long, value_name = "FX,FY,CX,CY,K1,K2,P1,P2,K3")]
     undistort: Option<LensDistortion>,
     /// Keep a part of the picture, in pixels before averaging
     #[arg(long, value_name = "X,Y,WxH", value_parser = parse_rect)]

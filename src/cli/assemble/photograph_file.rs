@@ -25,6 +25,8 @@ const MAX_SAMPLE_BYTES: u64 = 4 << 30;
 const FLOAT_BLACK: f64 = 2048.0;
 /// Share of the pixels that are equal to the largest in a pile: far more than of a bright part of an object, which has noise.
 const MIN_PILE_PIXELS: f64 = 0.005;
+/// The least weight of a saturated sample in a pixel that is saturated.
+const MIN_SATURATING_WEIGHT: f64 = 1e-3;
 /// Where a pile begins, as a share of white: a darker one would be of another cause.
 const MIN_PILE_SHARE: f64 = 0.5;
 /// Code from which on raw files are saturated, if none is given. The converter rounds down, and averages two greens of
@@ -230,7 +232,7 @@ fn develop_samples(
             development.average(extent, taps, sample)
         }
         Some(lens) => {
-            lens.check(samples.extent())?;
+            lens.check(samples.extent(), rect)?;
             let taps = |x: u32, y: u32| {
                 let (x, y) = place(x, y);
                 lens.taps(samples.extent(), x, y)
@@ -326,6 +328,37 @@ struct Development {
     bin: u32,
 }
 
+/// A weighted sum that stays within its terms: weights of cubic convolution may be negative.
+struct InterpolatedPixel {
+    sum: [f64; CHANNELS],
+    range: [[f64; 2]; CHANNELS],
+}
+
+impl Default for InterpolatedPixel {
+    fn default() -> Self {
+        Self {
+            sum: [0.0; CHANNELS],
+            range: [[f64::INFINITY, f64::NEG_INFINITY]; CHANNELS],
+        }
+    }
+}
+
+impl InterpolatedPixel {
+    fn add(&mut self, c: usize, weight: f64, measurement: f64) {
+        self.sum[c] += weight * measurement;
+        let [least, largest] = self.range[c];
+        self.range[c] = [least.min(measurement), largest.max(measurement)];
+    }
+
+    /// 0 without terms.
+    fn value(&self, c: usize) -> f64 {
+        match self.range[c] {
+            [least, largest] if least <= largest => self.sum[c].clamp(least, largest),
+            _ => 0.0,
+        }
+    }
+}
+
 /// A pixel has a sample that is not a number, or minus infinity.
 #[derive(Debug, PartialEq)]
 struct NotANumber {
@@ -381,6 +414,7 @@ impl Development {
             let mut total = [0.0; CHANNELS];
             let mut is_saturated = [false; CHANNELS];
             for (dx, dy) in Extent::new(bin, bin).cells() {
+                let mut pixel = InterpolatedPixel::default();
                 for Tap { x, y, weight } in taps(x * bin + dx, y * bin + dy) {
                     pixels += 1;
                     let sample = sample(x, y);
@@ -389,11 +423,13 @@ impl Development {
                             return Err(NotANumber { x, y });
                         }
                         largest[c].add(sample[c]);
-                        is_saturated[c] |= sample[c] >= white;
+                        is_saturated[c] |=
+                            sample[c] >= white && weight.abs() >= MIN_SATURATING_WEIGHT;
                         let share = (sample[c].min(white) - black) * scale;
-                        total[c] += weight * self.response.linearise(share);
+                        pixel.add(c, weight, self.response.linearise(share));
                     }
                 }
+                (0..CHANNELS).for_each(|c| total[c] += pixel.value(c));
             }
             let part = thumbnail_part(extent, x, y);
             codes.push(std::array::from_fn(|c| {
@@ -424,6 +460,7 @@ impl Development {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::photo_file::SampleValues;
 
     const SETTINGS: DevelopSettings = DevelopSettings {
         response: None,
@@ -466,6 +503,54 @@ mod tests {
         // The last has no taps, and is black.
         assert_eq!(codes, [1250, 2500, MAX_CODE, 500]);
         assert_eq!(photo.pixels, 6);
+        // A sum that leaves the range of its samples, and a saturated sample that hardly counts.
+        let taps = |x: u32, y: u32| {
+            let weights = if x < 2 { [1.1, -0.1] } else { [0.9999, 0.0001] };
+            [0, 1].map(|i| Tap {
+                x: x + i,
+                y,
+                weight: weights[i as usize],
+            })
+        };
+        let photo = development
+            .average(Extent::new(3, 1), taps, sample)
+            .unwrap();
+        let codes: Vec<u16> = photo.codes.iter().map(|code| code[0]).collect();
+        assert_eq!(codes, [1000, 2000, 4006]);
+        assert_eq!(photo.saturated, 0);
+    }
+
+    #[test]
+    fn the_undistorted_picture_is_cropped_then_turned() {
+        let extent = Extent::new(12, 10);
+        let value = |x: u32, y: u32| (1000 + 300 * x + 2000 * (y % 3)) as u16;
+        let values = extent.cells().flat_map(|(x, y)| [value(x, y); CHANNELS]);
+        let photograph =
+            PhotoSamples::new(extent, SampleValues::U16(values.collect()), CHANNELS, false)
+                .unwrap();
+        let developed = |crop: Option<TileRect>, degrees: u32| {
+            let settings = DevelopSettings {
+                bin: 1,
+                undistort: Some("10,10,5.5,4.5,-0.1,0.01".parse().unwrap()),
+                crop,
+                rotate: Rotation::from_degrees(degrees).unwrap(),
+                ..SETTINGS
+            };
+            develop_samples(&photograph, SampleKind::Integer, &settings).unwrap()
+        };
+        let whole = developed(None, 0).codes;
+        let crop = TileRect {
+            x: 3,
+            y: 2,
+            extent: Extent::new(4, 6),
+        };
+        let turned = developed(Some(crop), 90);
+        assert_eq!((turned.camera.width, turned.camera.height), (6, 4));
+        for (i, (x, y)) in Extent::new(6, 4).cells().enumerate() {
+            // Clockwise: the bottom left corner becomes the top left one.
+            let (from_x, from_y) = (3 + y, 2 + 5 - x);
+            assert_eq!(turned.codes[i], whole[(from_y * 12 + from_x) as usize]);
+        }
     }
 
     #[test]

@@ -96,7 +96,7 @@ impl Session {
             Err(error) => {
                 eprintln!("warning: {}", error_with_remedy(&error));
                 eprintln!(
-                    "{summary}; it cannot be recovered without \"correspondence\". Are --black, --white, --bin and --crop right?"
+                    "{summary}; it cannot be recovered without \"correspondence\". Are --black, --white, --bin, --crop and --undistort right?"
                 );
             }
         }

@@ -136,7 +136,7 @@ pub fn run(args: &ImportArgs) -> Result<()> {
             eprintln!("warning: {}", advice::error_with_remedy(&error));
             eprintln!(
                 "{output}: {summary}; it cannot be recovered without \"correspondence\". Are pictures and photographs in the same \
-                 order, and --black, --white, --bin and --crop right?"
+                 order, and --black, --white, --bin, --crop and --undistort right?"
             );
         }
     }

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! The first term is the squared error under a light of independent elements, the second that under a uniform light. The
-//! sum is minimised greedily: some numbers change by one step, all in the direction that brings Σ e nearer to 0, the cheapest
-//! first.
+//! sum is minimised greedily: some numbers change by one step, all in the direction that Σ e has at first, the cheapest first;
+//! those that are more than half a step off do so even if Σ e changes its sign.
 
 use std::array::from_fn;
 
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn functions_whose_errors_sum_to_zero_are_left() {
+    fn small_errors_that_sum_to_zero_are_left() {
         let balanced = [7.0, -3.0, 0.3, -0.3, 0.0];
         let mut slots = rounded(&balanced);
         restore_sums(&mut slots, 1.0);

@@ -152,7 +152,7 @@ impl<'a, E: Executor> RateController<'a, E> {
         };
         let (mut file, mut is_within) = encode(1.0)?;
         for factor in RETRY_SHARE_FACTORS {
-            // A reader fetches small files at once, but for long metadata.
+            // A reader fetches small files at once, unless long metadata make them large.
             if is_within || usual_bytes(&file, file.bytes()) <= FIRST_BYTES {
                 break;
             }

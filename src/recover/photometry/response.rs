@@ -166,11 +166,9 @@ impl<E: Executor> ResponseSearch<'_, E> {
             }
         }
         candidates.retain(|scored| scored.hypothesis.is_far() && scored.is_better_than(&declared));
-        candidates.sort_by(|a, b| a.mean().total_cmp(&b.mean()));
-        Ok(candidates
-            .into_iter()
-            .map(|scored| scored.hypothesis)
-            .collect())
+        let order = linalg::ascending_order(candidates.iter().map(Scored::mean));
+        let hypotheses = order.into_iter().map(|i| candidates[i].hypothesis);
+        Ok(hypotheses.collect())
     }
 
     /// If the flood photograph tells compressed highlights, it does so best.
