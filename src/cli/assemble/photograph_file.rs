@@ -209,14 +209,8 @@ fn develop_samples(
         "has 8 bits a sample, mostly with a tone curve. Give --response srgb, or --response linear if it has none; 16-bit \
          linear photographs or raw files are far better"
     );
-    let stored = settings.stored(kind)?;
+    let development = Development::new(settings, kind)?;
     let rect = kept_part(samples.extent(), settings)?;
-    let development = Development {
-        stored,
-        written: settings.written(kind, stored),
-        response: settings.response(),
-        bin: settings.bin,
-    };
     let place = |x: u32, y: u32| {
         let (x, y) = settings.rotate.source(rect.extent, x, y);
         (rect.x + x, rect.y + y)
@@ -248,7 +242,7 @@ fn develop_samples(
         ),
     };
     let count = (averaged.codes.len() * CHANNELS) as f64;
-    let pile = averaged.pile(stored);
+    let pile = averaged.pile(development.stored);
     Ok(DevelopedPhotograph {
         camera: ManifestCamera {
             width: averaged.extent.width,
@@ -325,7 +319,11 @@ struct Development {
     stored: Levels,
     written: Levels,
     response: CameraResponse,
+    /// Shares of white in a sample.
+    scale: f64,
     bin: u32,
+    /// `[code]`: the measurements of integers that have a tone curve, which takes long to compute; else empty.
+    measurements: Vec<f64>,
 }
 
 /// A weighted sum that stays within its terms: weights of cubic convolution may be negative.
@@ -393,6 +391,37 @@ impl AveragedPhotograph {
 }
 
 impl Development {
+    fn new(settings: &DevelopSettings, kind: SampleKind) -> Result<Self> {
+        let stored = settings.stored(kind)?;
+        let mut development = Self {
+            stored,
+            written: settings.written(kind, stored),
+            response: settings.response(),
+            scale: (stored.white - stored.black).recip(),
+            bin: settings.bin,
+            measurements: Vec::new(),
+        };
+        let are_integers = matches!(kind, SampleKind::EightBit | SampleKind::Integer);
+        if are_integers && development.response != CameraResponse::Linear {
+            let measurements = (0..=MAX_CODE).map(|code| development.measurement(code.into()));
+            development.measurements = measurements.collect();
+        }
+        Ok(development)
+    }
+
+    /// What a sample measures, as a share of white.
+    fn measurement(&self, sample: f64) -> f64 {
+        let code = sample as usize; // `as` saturates
+        match self.measurements.get(code) {
+            Some(measurement) if code as f64 == sample => *measurement,
+            _ => {
+                let Levels { black, white } = self.stored;
+                let share = (sample.min(white) - black) * self.scale;
+                self.response.linearise(share)
+            }
+        }
+    }
+
     /// Linearises samples and averages squares of pixels of a picture, each of which is the sum of its `taps`; `sample` gives those
     /// of the photograph. Samples at white or above, infinity included, are saturated, and so is every square that has one.
     fn average<T: IntoIterator<Item = Tap>>(
@@ -402,8 +431,7 @@ impl Development {
         sample: impl Fn(u32, u32) -> [f64; CHANNELS],
     ) -> Result<AveragedPhotograph, NotANumber> {
         let bin = self.bin;
-        let Levels { black, white } = self.stored;
-        let scale = (white - black).recip();
+        let white = self.stored.white;
         let extent = Extent::new(picture.width / bin, picture.height / bin);
         let mut codes = Vec::with_capacity(extent.area());
         let mut sums =
@@ -425,8 +453,7 @@ impl Development {
                         largest[c].add(sample[c]);
                         is_saturated[c] |=
                             sample[c] >= white && weight.abs() >= MIN_SATURATING_WEIGHT;
-                        let share = (sample[c].min(white) - black) * scale;
-                        pixel.add(c, weight, self.response.linearise(share));
+                        pixel.add(c, weight, self.measurement(sample[c]));
                     }
                 }
                 (0..CHANNELS).for_each(|c| total[c] += pixel.value(c));
@@ -473,13 +500,7 @@ mod tests {
     };
 
     fn development(settings: &DevelopSettings, kind: SampleKind) -> Development {
-        let stored = settings.stored(kind).unwrap();
-        Development {
-            stored,
-            written: settings.written(kind, stored),
-            response: settings.response(),
-            bin: settings.bin,
-        }
+        Development::new(settings, kind).unwrap()
     }
 
     fn whole(x: u32, y: u32) -> [Tap; 1] {
@@ -583,6 +604,25 @@ mod tests {
         let photo = photo.average(Extent::new(2, 2), whole, sample).unwrap();
         // Half of a quarter of white.
         assert!(photo.codes[0][0].abs_diff(8192) <= 1, "{:?}", photo.codes);
+    }
+
+    #[test]
+    fn integers_with_fractions_have_a_tone_curve_as_well() {
+        let settings = DevelopSettings {
+            response: Some(CameraResponse::Gamma(2.0)),
+            black: None,
+            white: None,
+            ..SETTINGS
+        };
+        let development = development(&settings, SampleKind::Integer);
+        for sample in [0.0, 0.5, 1000.0, 1000.25, 65_535.0, 70_000.0] {
+            let expected = (sample / 65_535.0_f64).min(1.0).powi(2);
+            let measurement = development.measurement(sample);
+            assert!(
+                (measurement - expected).abs() < 1e-12,
+                "{sample}: {measurement}"
+            );
+        }
     }
 
     #[test]
