@@ -139,7 +139,7 @@ impl LensDistortion {
         let [x, y] = self.direction(pixel);
         let ([k1, k2, k3], [p1, p2]) = (self.radial, self.tangential);
         let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let radial = self.radial_factor(r2);
         let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
         let xx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
         let yy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
@@ -176,12 +176,18 @@ impl LensDistortion {
         [0, 1].map(|i| (pixel[i] - self.centre[i]) / self.focal[i])
     }
 
+    /// 1 + k₁ r² + k₂ r⁴ + k₃ r⁶.
+    fn radial_factor(&self, r2: f64) -> f64 {
+        let [k1, k2, k3] = self.radial;
+        1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    }
+
     /// The place in the photograph of a place in the undistorted picture.
     fn distorted(&self, pixel: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.direction(pixel);
-        let ([k1, k2, k3], [p1, p2]) = (self.radial, self.tangential);
+        let [p1, p2] = self.tangential;
         let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let radial = self.radial_factor(r2);
         let direction = [
             x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
             y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
