@@ -10,7 +10,7 @@
 mod banded;
 mod cholesky;
 mod cosine;
-#[cfg(feature = "simulate")]
+#[cfg(any(test, feature = "simulate"))]
 mod cubic_convolution;
 mod eigen;
 mod kernels;
@@ -23,6 +23,8 @@ mod vectorise;
 pub(crate) use banded::BandedMatrix;
 pub(crate) use cholesky::{cholesky, cholesky_inverse, cholesky_solve, cholesky_with_ridge};
 pub(crate) use cosine::cos_pi;
+#[cfg(all(test, not(target_arch = "wasm32")))]
+pub(crate) use cubic_convolution::cubic_convolution;
 #[cfg(feature = "simulate")]
 pub(crate) use cubic_convolution::cubic_convolution_weights;
 pub(crate) use eigen::{symmetric_eigen, symmetric_eigenvalues};

@@ -97,6 +97,11 @@ struct Levels {
 }
 
 impl Levels {
+    /// A number as a share of white.
+    fn share(self, number: f64) -> f64 {
+        (number - self.black) * (self.white - self.black).recip()
+    }
+
     fn number(self, share: f64) -> f64 {
         self.black + share * (self.white - self.black)
     }
@@ -319,8 +324,6 @@ struct Development {
     stored: Levels,
     written: Levels,
     response: CameraResponse,
-    /// Shares of white in a sample.
-    scale: f64,
     bin: u32,
     /// `[code]`: the measurements of integers that have a tone curve, which takes long to compute; else empty.
     measurements: Vec<f64>,
@@ -397,7 +400,6 @@ impl Development {
             stored,
             written: settings.written(kind, stored),
             response: settings.response(),
-            scale: (stored.white - stored.black).recip(),
             bin: settings.bin,
             measurements: Vec::new(),
         };
@@ -415,8 +417,7 @@ impl Development {
         match self.measurements.get(code) {
             Some(measurement) if code as f64 == sample => *measurement,
             _ => {
-                let Levels { black, white } = self.stored;
-                let share = (sample.min(white) - black) * self.scale;
+                let share = self.stored.share(sample.min(self.stored.white));
                 self.response.linearise(share)
             }
         }
@@ -497,6 +498,14 @@ mod tests {
         undistort: None,
         crop: None,
         rotate: Rotation::NONE,
+    };
+
+    /// With a tone curve, from 0 to the largest code.
+    const SQUARE: DevelopSettings = DevelopSettings {
+        response: Some(CameraResponse::Gamma(2.0)),
+        black: None,
+        white: None,
+        ..SETTINGS
     };
 
     fn development(settings: &DevelopSettings, kind: SampleKind) -> Development {
@@ -593,14 +602,8 @@ mod tests {
 
     #[test]
     fn a_tone_curve_is_undone_before_averaging() {
-        let settings = DevelopSettings {
-            response: Some(CameraResponse::Gamma(2.0)),
-            black: None,
-            white: None,
-            ..SETTINGS
-        };
         let sample = |x: u32, _: u32| if x == 0 { [0.0; 3] } else { [32_768.0; 3] };
-        let photo = development(&settings, SampleKind::EightBit);
+        let photo = development(&SQUARE, SampleKind::EightBit);
         let photo = photo.average(Extent::new(2, 2), whole, sample).unwrap();
         // Half of a quarter of white.
         assert!(photo.codes[0][0].abs_diff(8192) <= 1, "{:?}", photo.codes);
@@ -608,13 +611,7 @@ mod tests {
 
     #[test]
     fn integers_with_fractions_have_a_tone_curve_as_well() {
-        let settings = DevelopSettings {
-            response: Some(CameraResponse::Gamma(2.0)),
-            black: None,
-            white: None,
-            ..SETTINGS
-        };
-        let development = development(&settings, SampleKind::Integer);
+        let development = development(&SQUARE, SampleKind::Integer);
         for sample in [0.0, 0.5, 1000.0, 1000.25, 65_535.0, 70_000.0] {
             let expected = (sample / 65_535.0_f64).min(1.0).powi(2);
             let measurement = development.measurement(sample);

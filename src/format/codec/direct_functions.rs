@@ -2,8 +2,8 @@
 //!
 //! Slots come in centre-out order, as functions peak near the window's centre: slots far away are mostly
 //! zero, and zeros to the end of a run are one token. Red, green and blue of a slot are rounded to multiples
-//! of the scan's step, so that sums over slots are kept (`sum_rounding`), then transformed to Y, Co, Cg. A chunk is one token string with a run
-//! `[item, Y Co Cg]` for each pixel. Scans add up.
+//! of the scan's step, so that sums over slots are kept (`sum_rounding`), then transformed to Y, Co, Cg. A chunk is
+//! one token string with a run `[item, Y Co Cg]` for each pixel. Scans add up.
 
 use std::ops::Range;
 

@@ -3,6 +3,7 @@
 use super::*;
 use crate::capture::{Measurements, Pattern};
 use crate::job_executor::SequentialExecutor;
+use crate::linalg::cubic_convolution;
 use crate::recover::error::RecoverError;
 use crate::recover::holdout_split::HoldoutSplit;
 use crate::recover::mean_function::mean_function;
@@ -83,15 +84,6 @@ fn a_single_exposure_is_corrected_and_the_others_are_not() {
     }
 }
 
-/// The cubic convolution of Keys (1981).
-fn keys(x: f64) -> f64 {
-    match x.abs() {
-        x if x < 1.0 => 1.5 * x.powi(3) - 2.5 * x * x + 1.0,
-        x if x < 2.0 => -0.5 * x.powi(3) + 2.5 * x * x - 4.0 * x + 2.0,
-        _ => 0.0,
-    }
-}
-
 /// Shifts the pictures of a capture, with an interpolation kernel at the places of the shift.
 fn shift_pictures(
     measurements: &mut Measurements,
@@ -130,7 +122,7 @@ fn a_camera_that_trembles_is_followed() {
     }
     let clean = SyntheticCapture::smooth(PATTERNS).measurements;
     let mut capture = SyntheticCapture::smooth(PATTERNS);
-    shift_pictures(&mut capture.measurements, keys, |l| shifts[l]);
+    shift_pictures(&mut capture.measurements, cubic_convolution, |l| shifts[l]);
     let photometry = photometry_of(&capture);
     assert!(photometry.faults.is_empty(), "{:?}", photometry.faults);
     for (l, correction) in photometry.corrections.iter().enumerate() {
@@ -176,7 +168,10 @@ fn pictures_interpolate_as_softly_as_their_shifts_show() {
         shift_pictures(&mut capture.measurements, kernel, |l| shifts[l]);
         photometry_of(&capture).softness
     };
-    let (cubic, line) = (softness(keys), softness(|x| (1.0 - x.abs()).max(0.0)));
+    let (cubic, line) = (
+        softness(cubic_convolution),
+        softness(|x| (1.0 - x.abs()).max(0.0)),
+    );
     assert!((cubic - 0.5).abs() < 0.15, "{cubic}");
     assert!(line > 0.8, "{line}");
 }
@@ -185,7 +180,7 @@ fn pictures_interpolate_as_softly_as_their_shifts_show() {
 fn photographs_after_a_move_are_left_out() {
     let mut capture = SyntheticCapture::smooth(PATTERNS);
     let after = 24;
-    shift_pictures(&mut capture.measurements, keys, |l| {
+    shift_pictures(&mut capture.measurements, cubic_convolution, |l| {
         if l < after { [0.0; 2] } else { [0.5, -0.3] }
     });
     let faults = photometry_of(&capture).faults;
