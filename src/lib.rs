@@ -17,6 +17,7 @@
 //! | [`transport`] | – | the matrix in memory, shared by the others | |
 //! | [`format`] | a transport | an `.ltm` file, and back | |
 //! | [`export`] | a capture | an `.ltm` file, by the modules above | |
+//! | `pyramid` | an `.ltm` file | one of several levels | |
 //! | [`relight`] | a transport and a light | a picture | |
 //! | [`study`] | known transport | accuracy figures and tables | `study` |
 //!
@@ -35,6 +36,8 @@ pub mod job_executor;
 mod linalg;
 #[cfg(all(feature = "photo_file", not(target_arch = "wasm32")))]
 pub mod photo_file;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod pyramid;
 pub mod recover;
 pub mod relight;
 #[cfg(feature = "simulate")]

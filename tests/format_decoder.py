@@ -29,6 +29,9 @@ MAX_CONTENT_BYTES = MAX_WINDOW_BYTES = 1 << 23
 MAX_EXPONENT = 30
 SPACINGS = 8, 4096
 MAX_CONTROL_POINTS = 1 << 20
+MAX_LEVEL_SIDE = 1 << 20
+MAX_LEVELS = 14
+SHARD_SIDES = 256, 4096
 
 
 class Refused(Exception):
@@ -88,7 +91,7 @@ class FileIndex:
             at += length
         self.index_bytes = at
         self.read_directory(sections[0])
-        self.displacement = read_extensions(sections[1], self.width, self.height)
+        self.read_extensions(sections[1])
         read_metadata(sections[2])
         self.take_chunks(file)
 
@@ -119,6 +122,42 @@ class FileIndex:
         self.tiles = [  # columns and rows
             (min(side, self.width - x), min(side, self.height - y)) for x, y in self.corners
         ]
+
+    def read_extensions(self, data):  # sections 3.3, 3.4 and 12
+        """The displacement, the table of levels and the place of a shard, each if there is one."""
+        known, at = {}, 0
+        while at < len(data):
+            require(at + 12 <= len(data), "an extension that is cut short")
+            tag, flags, length = unpack_from("<4sII", data, at)
+            at += 12 + length
+            require(at <= len(data), "an extension that is cut short")
+            if tag in (b"DISP", b"LEVL", b"SHRD"):
+                require(tag not in known, f"two extensions {tag}")
+                known[tag] = data[at - length : at]
+            else:
+                require(not flags & 1, f"an extension that must be understood: {tag}")
+        place = known.get(b"SHRD")
+        require(place is None or len(place) == 20, "the place of a shard")
+        self.place = place and unpack_from("<5I", place)
+        _, self.first_x, self.first_y, self.first_u, self.first_v = self.place or [0] * 5
+        self.table = known.get(b"LEVL")
+        self.displacement = None
+        if b"DISP" in known:
+            self.displacement = self.read_displacement(known[b"DISP"])
+
+    def read_displacement(self, data):  # sections 3.4 and 12
+        """Spacing, step, and codes `[axis, row, column]`."""
+        require(len(data) >= 8, "a displacement that is cut short")
+        spacing, step = unpack_from("<H2xf", data)
+        require(SPACINGS[0] <= spacing <= SPACINGS[1], "the spacing of control points")
+        require(0 < step < math.inf, "the step of a displacement")
+        width, height = self.first_x % spacing + self.width, self.first_y % spacing + self.height
+        columns, rows = (-(-side // spacing) + 1 for side in (width, height))
+        require(columns * rows <= MAX_CONTROL_POINTS, "too many control points")
+        number = join_bytes(decompress(data[8:], 4 * columns * rows), "<u2").astype(int)
+        difference = np.where(number % 2 == 0, number >> 1, -(number >> 1) - 1)
+        codes = np.cumsum(difference.reshape(2, rows, columns), axis=2)
+        return spacing, float(step), (codes + 32768) % 65536 - 32768
 
     def read_directory(self, frame):  # section 3.2
         scans, tiles, area = self.scan_count, len(self.tiles), self.w**2
@@ -176,33 +215,56 @@ def is_valid_entry(coding, count, tile, length, content):  # appendix A
     return low <= content <= min(high, MAX_CONTENT_BYTES) and length <= max_bytes
 
 
-def read_extensions(data, width, height):  # section 3.3
-    """The displacement of the correspondence, if there is one."""
-    at, displacement = 0, None
-    while at < len(data):
-        require(at + 12 <= len(data), "an extension that is cut short")
-        tag, flags, length = unpack_from("<4sII", data, at)
-        require(tag == b"DISP" or not flags & 1, f"an extension that must be understood: {tag}")
-        at += 12 + length
-        require(at <= len(data), "an extension that is cut short")
-        if tag == b"DISP":
-            require(displacement is None, "two displacements")
-            displacement = read_displacement(data[at - length : at], width, height)
-    return displacement
+def split_levels(file):  # section 12
+    """The file, or its root and its shards in file order, each an index and its bytes."""
+    require(len(file) >= 144, "a header that is cut short")
+    root_bytes = unpack_from("<Q", file, 88)[0]
+    root = FileIndex(file[:root_bytes])
+    require(root.place is None, "a shard without its file")
+    if root.table is None:
+        require(root_bytes == len(file), "bytes after the end of the file")
+        return [(root, file)]
+    require(len(root.table) >= 24, "a table of levels that is cut short")
+    *sides, levels, shard_side = unpack_from("<6I", root.table)
+    require(all(1 <= side <= MAX_LEVEL_SIDE for side in sides), "a side of level 0")
+    require(2 <= levels <= MAX_LEVELS, "the number of levels")
+    is_shard_side = SHARD_SIDES[0] <= shard_side <= SHARD_SIDES[1]
+    require(is_shard_side and shard_side & (shard_side - 1) == 0, "the side of shards")
+    extents = [[-(-side >> level) for side in sides] for level in range(levels)]
+    own = [root.width, root.height, root.light_width, root.light_height]
+    require(extents[-1] == own, "a root of another size")
+    require(max(own[:2]) <= shard_side, "a root of more than one shard")
+    places = [
+        (level, x, y)
+        for level in range(levels - 2, -1, -1)
+        for y, x in sorted(
+            ((y, x) for y in shard_starts(extents[level][1], shard_side)
+             for x in shard_starts(extents[level][0], shard_side)),
+            key=lambda place: morton(place[1] // shard_side, place[0] // shard_side),
+        )
+    ]
+    require(len(root.table) == 24 + 4 * len(places), "the number of shards")
+    parts, at = [(root, file[:root_bytes])], root_bytes
+    for (level, x, y), length in zip(places, unpack_from(f"<{len(places)}I", root.table, 24)):
+        part = file[at : at + length]
+        index, at = FileIndex(part), at + length
+        width, height, light_width, light_height = extents[level]
+        require(index.place and index.place[:3] == (level, x, y), "a shard at another place")
+        size = min(shard_side, width - x), min(shard_side, height - y)
+        require((index.width, index.height) == size, "a shard of another size")
+        require(index.first_u + index.light_width <= light_width, "the light plane of a shard")
+        require(index.first_v + index.light_height <= light_height, "the light plane of a shard")
+        parts.append((index, part))
+    require(at == len(file), "shards whose lengths do not add up")
+    return parts
 
 
-def read_displacement(data, width, height):  # section 3.4
-    """Spacing, step, and codes `[axis, row, column]`."""
-    require(len(data) >= 8, "a displacement that is cut short")
-    spacing, step = unpack_from("<H2xf", data)
-    require(SPACINGS[0] <= spacing <= SPACINGS[1], "the spacing of control points")
-    require(0 < step < math.inf, "the step of a displacement")
-    columns, rows = (-(-side // spacing) + 1 for side in (width, height))
-    require(columns * rows <= MAX_CONTROL_POINTS, "too many control points")
-    number = join_bytes(decompress(data[8:], 4 * columns * rows), "<u2").astype(int)
-    difference = np.where(number % 2 == 0, number >> 1, -(number >> 1) - 1)
-    codes = np.cumsum(difference.reshape(2, rows, columns), axis=2)
-    return spacing, float(step), (codes + 32768) % 65536 - 32768
+def shard_starts(side, shard_side):
+    return range(0, side, shard_side)
+
+
+def morton(column, row):  # section 12
+    return sum((column >> i & 1) << 2 * i | (row >> i & 1) << 2 * i + 1 for i in range(32))
 
 
 def read_metadata(data):  # appendix C
@@ -471,11 +533,13 @@ def decode(file, scans=None):  # section 4
 
 def window_origin(index, x, y):  # section 9
     a0, a1, a2, b0, b1, b2 = index.affine
-    u = a0 * (x + 0.5) + a1 * (y + 0.5) + a2
-    v = b0 * (x + 0.5) + b1 * (y + 0.5) + b2
+    whole_x, whole_y = index.first_x + x, index.first_y + y
+    u = a0 * (whole_x + 0.5) + a1 * (whole_y + 0.5) + a2
+    v = b0 * (whole_x + 0.5) + b1 * (whole_y + 0.5) + b2
     if index.displacement:
-        u += displacement_at(index.displacement, 0, x, y)
-        v += displacement_at(index.displacement, 1, x, y)
+        u += displacement_at(index, 0, x, y)
+        v += displacement_at(index, 1, x, y)
+    u, v = u - index.first_u, v - index.first_v
 
     def limited_floor(value):
         if math.isnan(value):
@@ -485,10 +549,11 @@ def window_origin(index, x, y):  # section 9
     return limited_floor(u) - (index.w - 1) // 2, limited_floor(v) - (index.w - 1) // 2
 
 
-def displacement_at(displacement, axis, x, y):  # section 9
-    spacing, step, codes = displacement
+def displacement_at(index, axis, x, y):  # sections 9 and 12
+    spacing, step, codes = index.displacement
     code = codes[axis].tolist()
-    gx, gy = (x + 0.5) / spacing, (y + 0.5) / spacing
+    gx = (index.first_x + x + 0.5) / spacing - index.first_x // spacing
+    gy = (index.first_y + y + 0.5) / spacing - index.first_y // spacing
     i, j = min(math.floor(gx), len(code[0]) - 2), min(math.floor(gy), len(code) - 2)
     right, down = gx - i, gy - j
     above = code[j][i] + (code[j][i + 1] - code[j][i]) * right
@@ -522,11 +587,14 @@ def code_of_light(y):  # section 10
 
 
 def dump(file):  # appendix G
+    return b"".join(dump_part(index, part) for index, part in split_levels(file))
+
+
+def dump_part(index, file):
     tiles, basis = decode(file)
     values = [value for tile in tiles for value in tile] + [basis]
     values = b"".join(np.ascontiguousarray(value, "<f4").tobytes() for value in values)
-    index = FileIndex(file)
-    if index.displacement:
+    if index.displacement or index.place:
         pixels = [(x, y) for y in range(index.height) for x in range(index.width)]
         values += np.array([window_origin(index, x, y) for x, y in pixels], "<i4").tobytes()
     return values

@@ -8,8 +8,9 @@ use std::path::Path;
 use fuzzing::choices::Choices;
 use fuzzing::source::ArbitraryInput;
 use image::{DynamicImage, ImageFormat};
+use relightable_photo::format::{EncodingTarget, FormatError, Metadata};
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::format::{Metadata, EncodingTarget};
+use relightable_photo::pyramid::{PyramidLayout, Spool, write_pyramid};
 use relightable_photo::transport::{
     Basis, Correspondence, Decibels, Extent, FloatTile, Geometry, Window,
 };
@@ -81,7 +82,45 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             std::fs::write(folder.join(name), seed)?;
         }
     }
+    let folder = seeds.join("levels");
+    std::fs::create_dir_all(&folder)?;
+    std::fs::write(folder.join("direct"), levels()?)?;
     write_photographs(&seeds.join("photo_file"))
+}
+
+/// A file of two levels in three shards, dark but for a direct tile of 8 x 8 pixels.
+fn levels() -> Result<Vec<u8>, FormatError> {
+    let mut input = input(0);
+    input.geometry.camera.width = 264;
+    input.geometry.light.width = 132;
+    input.geometry.tile_side = 256;
+    let lit = input.tiles.swap_remove(0).functions;
+    input.tiles = input.geometry.tiles().map(FloatTile::dark).collect();
+    input.tiles[1].functions = lit;
+    let encoded = input.encode(EncodingTarget::Snr(Decibels(20.0)), &SequentialExecutor)?;
+    let mut flat = Vec::new();
+    encoded.write(&mut flat)?;
+    let index = encoded.index();
+    let fetch = |chunk| {
+        let range = index.range(chunk);
+        Ok(flat[range.start as usize..range.end as usize].to_vec())
+    };
+    let layout = PyramidLayout {
+        levels: 2,
+        shard_side: 256,
+    };
+    let spools = [(); 2].map(|()| Spool::new(Cursor::new(Vec::new())));
+    let mut file = Vec::new();
+    write_pyramid(
+        index,
+        &fetch,
+        layout,
+        spools,
+        &SequentialExecutor,
+        &mut file,
+    )?;
+    println!("levels: {} bytes", file.len());
+    Ok(file)
 }
 
 /// Photographs of 5 x 4 pixels.

@@ -5,7 +5,7 @@ use fuzzing::choices::Choices;
 use fuzzing::source::{ArbitraryInput, ReversedExecutor, TargetChoice};
 use fuzzing::{reading, seal};
 use libfuzzer_sys::fuzz_target;
-use relightable_photo::format::{EncodedFile, FormatError, EncodingTarget};
+use relightable_photo::format::{EncodedFile, EncodingTarget, FormatError};
 
 fuzz_target!(|data: &[u8]| {
     let mut choices = Choices(data);

@@ -3,6 +3,7 @@
 //! | target | input | property |
 //! |---|---|---|
 //! | `open` | a file | its file index is read or refused, and no length exceeds the limits |
+//! | `levels` | a file | its table of levels and its shards are read or refused, within the limits |
 //! | `decode` | a file | it is read or refused within the memory budget, previews included, and `check` has the same result |
 //! | `chunked` | a file and choices | pieces in any order give the same as the whole file |
 //! | `crafted` | choices | the properties of `decode` and `chunked`, for assembled files with arbitrary frame contents |

@@ -2,8 +2,9 @@
 
 use relightable_photo::format::{
     self, ChunkSelection, FIRST_BYTES, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader,
-    MetadataText,
+    MetadataText, ShardId,
 };
+use relightable_photo::pyramid::PyramidReader;
 use relightable_photo::transport::{CHANNELS, Decibels, Tile, Transport, entry_slot};
 
 use crate::choices::Choices;
@@ -114,6 +115,59 @@ pub fn check_index(file: &[u8], choices: &mut Choices<'_>) {
     let (early, _) = early.expect("a file index gives a dark transport");
     assert_eq!(early.tiles.len(), index.tiles());
     assert!(early.tiles.iter().all(|tile| tile.is_dark()));
+}
+
+/// Checks the table of a file of several levels, and reads its first shards.
+///
+/// # Panics
+/// If a property does not hold.
+pub fn check_levels(file: &[u8]) {
+    let Some(root) = index(file) else {
+        return;
+    };
+    let root_bytes = root.header.file_bytes;
+    let Ok(Some(reader)) = PyramidReader::new(root, LIMITS) else {
+        return;
+    };
+    let table = reader.table();
+    let level = table.levels() - 1;
+    check_shard(file, &reader, ShardId { level, x: 0, y: 0 });
+    let mut next = root_bytes;
+    for (number, shard) in table.shards().iter().enumerate() {
+        let range = reader.range(*shard).expect("a shard of the table");
+        assert!(range.start == next && range.start <= range.end);
+        next = range.end;
+        let rect = table.rect(*shard);
+        let camera = table.camera(shard.level);
+        assert!(rect.x + rect.extent.width <= camera.width && rect.extent.area() > 0);
+        assert!(rect.y + rect.extent.height <= camera.height);
+        if number < 8 {
+            check_shard(file, &reader, *shard);
+        }
+    }
+    assert_eq!(next, reader.file_bytes());
+}
+
+fn check_shard(file: &[u8], reader: &PyramidReader, shard: ShardId) {
+    let fetch = |range: std::ops::Range<u64>| -> Result<Vec<u8>, FormatError> {
+        let [start, end] = [range.start, range.end].map(|at| at.min(file.len() as u64) as usize);
+        Ok(file[start..end].to_vec())
+    };
+    let rect = reader.table().rect(shard);
+    let (read, peak) = with_peak_bytes(|| reader.shard(shard, rect, fetch));
+    check_peak(peak.saturating_sub(2 * file.len()));
+    let Ok(index) = reader.index(shard, fetch) else {
+        assert!(read.is_err(), "a shard without a valid index was read");
+        return;
+    };
+    let geometry = &index.header.geometry;
+    assert!(geometry.check().is_ok());
+    let plane = reader.table().light(shard.level);
+    let [u, v] = geometry.correspondence.origin.light;
+    assert!(u + geometry.light.width <= plane.width && v + geometry.light.height <= plane.height);
+    if let Ok(shard) = read {
+        check_transport(&shard.transport);
+    }
 }
 
 /// Checks the properties of a transport that was read.

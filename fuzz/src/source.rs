@@ -2,13 +2,14 @@
 
 use std::ops::RangeInclusive;
 
-use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::format::{
-    DistortionMetric, EncodedFile, EncoderInput, FormatExtension, FormatError, Metadata, EncodingTarget,
+    DistortionMetric, EncodedFile, EncoderInput, EncodingTarget, FormatError, FormatExtension,
+    Metadata,
 };
+use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::transport::{
-    Basis, CHANNELS, Correspondence, Decibels, Extent, FloatTile, Geometry, TileTransportFunctions,
-    TileRect, Window,
+    Basis, CHANNELS, Correspondence, Decibels, Extent, FloatTile, Geometry, TileRect,
+    TileTransportFunctions, Window,
 };
 
 use crate::choices::Choices;

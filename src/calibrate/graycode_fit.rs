@@ -42,7 +42,7 @@ impl GrayCodeFit {
         let displacement = fit_displacement(camera, positions, &affine);
         let correspondence = Correspondence {
             displacement: displacement.map(Arc::new),
-            affine,
+            ..Correspondence::from_affine(affine)
         };
         let both = both_axes(positions);
         let affine = Correspondence::from_affine(affine);

@@ -388,6 +388,7 @@ impl Manifest {
         if let Some(Correspondence {
             affine,
             displacement,
+            ..
         }) = &self.correspondence
         {
             let [[a, b, _], [c, d, _]] = affine;

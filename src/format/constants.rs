@@ -9,7 +9,7 @@ pub(super) const SCAN_RECORD_BYTES: usize = 24;
 /// Bytes of a tile chunk's entry in the directory.
 pub(super) const CHUNK_ENTRY_BYTES: usize = 12;
 /// Maximum number of basis functions: those that a window of 31 x 31 elements can distinguish.
-pub(super) const MAX_RANK: u16 = 1024;
+pub const MAX_RANK: u16 = 1024;
 /// Maximum number of scans.
 pub(super) const MAX_SCANS: u32 = 1024;
 /// Maximum bytes of all extensions.

@@ -54,10 +54,10 @@ pub fn encode(grid: &DisplacementGrid) -> Result<FormatExtension, FormatError> {
     })
 }
 
-/// The grid over a picture of size `camera`.
+/// The grid over the pixels that a grid with a given spacing covers.
 pub fn decode(
     data: &[u8],
-    camera: Extent,
+    covered: impl FnOnce(u32) -> Extent,
     budget: &MemoryBudget,
 ) -> Result<DisplacementGrid, SectionError> {
     let invalid = || damaged("the displacement of the correspondence is invalid");
@@ -69,7 +69,7 @@ pub fn decode(
     if !(DisplacementGrid::MIN_SPACING..=DisplacementGrid::MAX_SPACING).contains(&spacing) {
         return Err(invalid());
     }
-    let points = DisplacementGrid::points_over(camera, spacing);
+    let points = DisplacementGrid::points_over(covered(spacing), spacing);
     if points.area() > DisplacementGrid::MAX_POINTS {
         return Err(invalid());
     }

@@ -149,6 +149,10 @@ pub enum FormatError {
     /// Writing: the source of a tile fails.
     #[error("a tile cannot be read back: {0}")]
     Source(std::io::Error),
+    /// Writing: a temporary file fails.
+    #[cfg(not(target_arch = "wasm32"))]
+    #[error("a temporary file beside it cannot be written or read: {0}")]
+    Spool(std::io::Error),
     /// Writing: the coarsest file is larger than asked for.
     #[error("the file takes at least {smallest} bytes, more than the {limit} asked for")]
     TooLarge {

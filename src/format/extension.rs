@@ -9,6 +9,14 @@ use super::memory_budget::MemoryBudget;
 const RECORD_HEADER_BYTES: usize = 12;
 /// The flag of an extension that a reader must know to read the file.
 const MUST_UNDERSTAND: u32 = 1;
+/// The extensions that this reader knows. In browsers there are no levels yet.
+const UNDERSTOOD: &[[u8; 4]] = &[
+    displacement::TAG,
+    #[cfg(not(target_arch = "wasm32"))]
+    super::levels::TABLE_TAG,
+    #[cfg(not(target_arch = "wasm32"))]
+    super::levels::PLACE_TAG,
+];
 
 /// A named block of data. Those that this version does not know, and may ignore, are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -57,12 +65,12 @@ pub(super) fn decode<'a>(
         let header = fields.try_bytes(RECORD_HEADER_BYTES).ok_or_else(cut)?;
         let tag = [header[0], header[1], header[2], header[3]];
         let [flags, length] = FieldReader(&header[4..]).u32s();
-        let is_known = tag == displacement::TAG;
-        if flags & MUST_UNDERSTAND != 0 && !is_known {
+        let must_understand = flags & MUST_UNDERSTAND != 0;
+        if must_understand && !UNDERSTOOD.contains(&tag) {
             return Err(FormatError::UnknownExtension(tag));
         }
         let data = fields.try_bytes(length as usize).ok_or_else(cut)?;
-        if is_known {
+        if tag == displacement::TAG {
             if extensions.displacement.replace(data).is_some() {
                 return Err(damaged("there are two displacements"));
             }
@@ -70,7 +78,7 @@ pub(super) fn decode<'a>(
         }
         let extension = FormatExtension {
             tag,
-            must_understand: false,
+            must_understand,
             data: budget.try_copy(data)?,
         };
         budget.try_push(&mut extensions.others, extension)?;

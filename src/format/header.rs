@@ -10,9 +10,9 @@ use crate::transport::{Correspondence, Geometry};
 
 /// Version of written files. A reader accepts other minor versions and refuses other major ones.
 const MAJOR: u16 = 1;
-/// Minor version of a file, and of one whose correspondence bends.
+/// Minor version of a file, and of one with extensions, which version 1.0 may not know.
 const MINOR: u16 = 0;
-const MINOR_WITH_DISPLACEMENT: u16 = 1;
+const MINOR_WITH_EXTENSIONS: u16 = 1;
 /// The magic number. A high bit, CR LF, ^Z and LF show damage by text mode, as in PNG and KTX2. The
 /// digits are those of version 1.0 and stand for major version 1.
 const MAGIC: [u8; 12] = *b"\xABLTM 10\xBB\r\n\x1A\n";
@@ -67,9 +67,9 @@ impl Header {
     pub(super) fn encode(&self) -> [u8; HEADER_BYTES] {
         let mut out = Vec::with_capacity(HEADER_BYTES);
         out.extend(MAGIC);
-        let minor = match self.geometry.correspondence.displacement {
-            Some(_) => MINOR_WITH_DISPLACEMENT,
-            None => MINOR,
+        let minor = match self.extensions.bytes {
+            0 => MINOR,
+            _ => MINOR_WITH_EXTENSIONS,
         };
         out.extend([MAJOR, minor].map(u16::to_le_bytes).as_flattened());
         for side in self.geometry.sides().as_flattened() {

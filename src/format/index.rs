@@ -11,8 +11,10 @@ use super::displacement;
 use super::error::{FormatError, SectionName};
 use super::extension::{self, Extensions, FormatExtension};
 use super::header::{Header, SectionEntry};
+#[cfg(not(target_arch = "wasm32"))]
+use super::levels::ShardPlace;
 use super::memory_budget::MemoryBudget;
-use super::metadata::{Metadata, MetadataText};
+use super::metadata::MetadataText;
 use super::scan::{ProgressiveScan, ScanCoding, rank_of};
 use crate::transport::Geometry;
 
@@ -53,10 +55,22 @@ impl FileIndex {
             displacement,
             others,
         } = extension::decode(extensions, budget)?;
+        let Geometry {
+            camera,
+            correspondence,
+            ..
+        } = &mut header.geometry;
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Some(place) = ShardPlace::decode(&others)
+            .map_err(|error| error.in_section(SectionName::Extensions))?
+        {
+            correspondence.origin = place.origin;
+        }
         if let Some(data) = displacement {
-            let grid = displacement::decode(data, header.geometry.camera, budget)
+            let covered = |spacing| correspondence.origin.covered(*camera, spacing);
+            let grid = displacement::decode(data, covered, budget)
                 .map_err(|error| error.in_section(SectionName::Extensions))?;
-            header.geometry.correspondence.displacement = Some(grid.into());
+            correspondence.displacement = Some(grid.into());
         }
         let content_bytes = usize::try_from(directory::content_bytes(&header));
         let records = decompress(frame, content_bytes.unwrap_or(usize::MAX), budget)
@@ -85,24 +99,16 @@ impl FileIndex {
         scans: Vec<ProgressiveScan>,
         entries: Vec<ChunkEntry>,
         extensions: Vec<FormatExtension>,
-        metadata: &Metadata,
+        metadata: MetadataText,
     ) -> Result<(Self, Vec<u8>), FormatError> {
+        #[cfg(not(target_arch = "wasm32"))]
+        check_tags(&extensions)?;
         let directory = compress(&directory::encode(&scans, &entries))?;
-        if extensions
-            .iter()
-            .any(|extension| extension.tag == displacement::TAG)
-        {
-            return Err(FormatError::DamagedSection {
-                section: SectionName::Extensions,
-                reason: "the tag DISP is that of the geometry's displacement".to_owned(),
-            });
-        }
         let displacement = geometry.correspondence.displacement.as_ref();
         let displacement = displacement
             .map(|grid| displacement::encode(grid))
             .transpose()?;
         let extension_bytes = extension::encode(displacement.iter().chain(&extensions));
-        let metadata = MetadataText::encode(metadata)?;
         let json = metadata.text().as_bytes();
         let mut header = Header {
             geometry,
@@ -211,6 +217,19 @@ impl FileIndex {
             scan: number / chunks,
             tile: (number % chunks).checked_sub(1),
         }
+    }
+}
+
+/// Checks that no extension has the tag of one that the geometry has. Pages write no extensions.
+#[cfg(not(target_arch = "wasm32"))]
+fn check_tags(extensions: &[FormatExtension]) -> Result<(), FormatError> {
+    let mut tags = extensions.iter().map(|extension| extension.tag);
+    match tags.any(|tag| tag == displacement::TAG) {
+        true => Err(FormatError::DamagedSection {
+            section: SectionName::Extensions,
+            reason: "the tag DISP is that of the geometry's displacement".to_owned(),
+        }),
+        false => Ok(()),
     }
 }
 

@@ -26,6 +26,8 @@ mod extension;
 mod fields;
 mod header;
 mod index;
+#[cfg(not(target_arch = "wasm32"))]
+mod levels;
 mod memory_budget;
 mod memory_estimate;
 mod metadata;
@@ -36,12 +38,14 @@ mod scan;
 mod tile_decoder;
 
 pub use chunk::{ChunkEntry, ChunkId};
-pub use constants::{FIRST_BYTES, HEADER_BYTES};
+pub use constants::{FIRST_BYTES, HEADER_BYTES, MAX_RANK};
 pub use encode::{DistortionMetric, EncodedFile, EncoderInput, EncodingTarget};
 pub use error::{FormatError, SectionName, TextModeDamage};
 pub use extension::FormatExtension;
 pub use header::Header;
 pub use index::FileIndex;
+#[cfg(not(target_arch = "wasm32"))]
+pub use levels::{LevelTable, ShardId, ShardPlace};
 pub use memory_budget::Limits;
 pub use metadata::{CaptureMetadata, Metadata, MetadataText};
 pub use partial_file::ChunkSelection;

@@ -257,6 +257,22 @@ impl Light {
         Self { extent, elements }
     }
 
+    /// The elements of a part of the light plane, whose first has this column and row.
+    ///
+    /// # Panics
+    /// If the part is not on the light plane.
+    pub fn crop(&self, [column, row]: [u32; 2], extent: Extent) -> Self {
+        let width = self.extent.width as usize;
+        let rows = (row..row + extent.height).flat_map(|v| {
+            let start = v as usize * width + column as usize;
+            &self.elements[start..start + extent.width as usize]
+        });
+        Self {
+            extent,
+            elements: rows.copied().collect(),
+        }
+    }
+
     /// Extent of the light plane.
     pub fn extent(&self) -> Extent {
         self.extent

@@ -5,6 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::displacement_grid::{DisplacementGrid, SharedGrid};
 use super::geometry::{CameraPixel, Extent, LightPosition};
+use super::shard_origin::ShardOrigin;
 
 /// The map from camera positions to the light plane positions behind them: an affine map, and a displacement where the
 /// correspondence bends.
@@ -14,9 +15,11 @@ pub struct Correspondence {
     pub affine: [[f64; 3]; 2],
     /// What is added to the affine map.
     pub displacement: Option<SharedGrid>,
+    /// Where the picture and its light plane begin, if they are those of a shard.
+    pub origin: ShardOrigin,
 }
 
-/// A correspondence in JSON.
+/// A correspondence in JSON, of a whole picture.
 #[derive(Serialize, Deserialize)]
 struct CorrespondenceFields {
     affine: [[f64; 3]; 2],
@@ -48,6 +51,7 @@ impl<'de> Deserialize<'de> for Correspondence {
         Ok(Self {
             affine: fields.affine,
             displacement: fields.displacement.map(SharedGrid::from),
+            origin: ShardOrigin::ZERO,
         })
     }
 }
@@ -58,6 +62,7 @@ impl Correspondence {
         Self {
             affine,
             displacement: None,
+            origin: ShardOrigin::ZERO,
         }
     }
 
@@ -68,18 +73,19 @@ impl Correspondence {
 
     /// Light plane position behind a camera position.
     pub fn map(&self, x: f64, y: f64) -> LightPosition {
-        let row = |[a, b, c]: [f64; 3]| a * x + b * y + c;
+        let in_level = self.origin.to_level([x, y]);
+        let row = |[a, b, c]: [f64; 3]| a * in_level[0] + b * in_level[1] + c;
         let [u, v] = self.affine.map(row);
-        match &self.displacement {
+        self.origin.to_shard(match &self.displacement {
             None => LightPosition { u, v },
             Some(grid) => {
-                let [du, dv] = grid.at(x, y);
+                let [du, dv] = self.origin.displacement(grid, [x, y]);
                 LightPosition {
                     u: u + du,
                     v: v + dv,
                 }
             }
-        }
+        })
     }
 
     /// The correspondence of a picture that is shifted by camera pixels to the right and down.
@@ -90,6 +96,7 @@ impl Correspondence {
         Self {
             affine: self.affine.map(row),
             displacement: displacement.map(|grid| SharedGrid::from(grid.shifted([dx, dy]))),
+            origin: self.origin,
         }
     }
 
@@ -156,6 +163,7 @@ mod tests {
         Correspondence {
             affine: [[0.5, 0.1, 3.0], [-0.2, 0.4, 1.0]],
             displacement: Some(grid.into()),
+            origin: ShardOrigin::ZERO,
         }
     }
 

@@ -119,13 +119,20 @@ impl DisplacementGrid {
     /// The displacement along u and v at a camera position, in light elements.
     #[inline(never)] // WebAssembly modules would have it many times
     pub fn at(&self, x: f64, y: f64) -> [f64; 2] {
-        let cell = |at: f64, points: u32| {
-            let at = (at / f64::from(self.spacing)).clamp(0.0, f64::from(points - 1));
+        self.at_from([x, y], [0; 2])
+    }
+
+    /// The displacement where the first control point is that with this column and row of a larger grid.
+    #[inline(always)]
+    pub(super) fn at_from(&self, [x, y]: [f64; 2], first: [u32; 2]) -> [f64; 2] {
+        let cell = |at: f64, first: u32, points: u32| {
+            let at = at / f64::from(self.spacing) - f64::from(first); // exact, as `first` is smaller
+            let at = at.clamp(0.0, f64::from(points - 1));
             let first = (at as u32).min(points - 2);
             (first as usize, at - f64::from(first))
         };
-        let (column, right) = cell(x, self.points.width);
-        let (row, down) = cell(y, self.points.height);
+        let (column, right) = cell(x, first[0], self.points.width);
+        let (row, down) = cell(y, first[1], self.points.height);
         let first = row * self.points.width as usize + column;
         let second = first + self.points.width as usize;
         std::array::from_fn(|axis| {

@@ -168,6 +168,15 @@ impl TileRect {
         }
     }
 
+    /// Whether all pixels lie on a grid of this extent.
+    pub fn is_within(self, grid: Extent) -> bool {
+        let is_in = |first: u32, count: u32, side: u32| {
+            first.checked_add(count).is_some_and(|end| end <= side)
+        };
+        let Self { x, y, extent } = self;
+        is_in(x, extent.width, grid.width) && is_in(y, extent.height, grid.height)
+    }
+
     /// The pixels, row by row.
     pub fn pixels(self) -> impl Iterator<Item = CameraPixel> {
         let TileRect { x, y, extent } = self;
@@ -218,13 +227,14 @@ impl Geometry {
         let Correspondence {
             affine,
             displacement,
+            origin,
         } = &self.correspondence;
         if !affine.as_flattened().iter().all(|a| a.is_finite()) {
             return Err(GeometryError::Correspondence);
         }
         match displacement
             .as_ref()
-            .is_none_or(|grid| grid.fits(self.camera))
+            .is_none_or(|grid| grid.fits(origin.covered(self.camera, grid.spacing())))
         {
             true => Ok(()),
             false => Err(GeometryError::Displacement),

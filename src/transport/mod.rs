@@ -20,6 +20,8 @@ mod function_codes;
 mod geometry;
 mod known_transport;
 mod quantisation;
+#[cfg_attr(target_arch = "wasm32", path = "no_shard_origin.rs")]
+mod shard_origin;
 mod singular_values;
 mod snr;
 mod tile;
@@ -40,6 +42,7 @@ pub use geometry::{
 };
 pub use known_transport::{KnownTransport, transport_error};
 pub(crate) use quantisation::ChannelPeaks;
+pub use shard_origin::ShardOrigin;
 pub use singular_values::SingularValueAnalysis;
 pub use snr::{Decibels, SnrAccumulator};
 pub use tile::{CoefficientCodes, TEXEL_COMPONENTS, TexelCodes, Tile, Transport};

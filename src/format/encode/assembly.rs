@@ -13,6 +13,7 @@ use crate::format::codec::half_float_codec;
 use crate::format::codec::transform_encoder::QuantisedCoefficients;
 use crate::format::error::FormatError;
 use crate::format::index::FileIndex;
+use crate::format::metadata::MetadataText;
 use crate::format::scan::{ProgressiveScan, ScanCoding};
 use crate::job_executor::Executor;
 use crate::transport::{Basis, Decibels, FloatTile, SnrAccumulator};
@@ -26,10 +27,10 @@ const HALVES_ERROR_RATIO: f64 = 4e-8;
 /// A file ready to be written.
 #[derive(Clone, Debug)]
 pub struct EncodedFile {
-    index: FileIndex,
-    index_bytes: Vec<u8>,
+    pub(super) index: FileIndex,
+    pub(super) index_bytes: Vec<u8>,
     /// In file order.
-    chunks: Vec<Vec<u8>>,
+    pub(super) chunks: Vec<Vec<u8>>,
 }
 
 impl EncodedFile {
@@ -290,13 +291,9 @@ fn assemble(
         }
     }
     let extensions = source.extensions.clone();
-    let (index, index_bytes) = FileIndex::encode(
-        geometry.clone(),
-        scans,
-        entries,
-        extensions,
-        &source.metadata,
-    )?;
+    let metadata = MetadataText::encode(&source.metadata)?;
+    let (index, index_bytes) =
+        FileIndex::encode(geometry.clone(), scans, entries, extensions, metadata)?;
     Ok(EncodedFile {
         index,
         index_bytes,

@@ -6,6 +6,7 @@
 //! rate_control         sample, target                           -> step, rank
 //! scan_plan            sample, step, shares of the file         -> scans
 //! assembly             all tiles, scans                         -> chunks, file
+//! shard                some tiles of a file                     -> file
 //! ```
 
 mod assembly;
@@ -15,6 +16,8 @@ mod rate_control;
 mod rate_control_sample;
 mod scan_costs;
 mod scan_plan;
+#[cfg(not(target_arch = "wasm32"))]
+mod shard;
 mod source_analysis;
 
 pub use assembly::EncodedFile;

@@ -67,6 +67,23 @@ impl EncodedFile {
             EncodingTarget::Lossless => assembly::encode_lossless(&analysed),
         }
     }
+
+    /// Encodes a file with the quantisation step of another: for the shards of a picture, which are then equally accurate.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new), but [`FormatError::TooLarge`].
+    ///
+    /// # Panics
+    /// As [`new`](Self::new).
+    pub fn with_step(
+        source: EncoderInput<'_>,
+        step: f32,
+        executor: &impl Executor,
+    ) -> Result<Self, FormatError> {
+        let mut controller = RateController::new(AnalysedSource::new(source, executor)?)?;
+        let is_lit = controller.trial_error(step).signal > 0.0;
+        controller.encode_with_step(is_lit.then_some(step))
+    }
 }
 
 /// The search for a file's step and rank.

@@ -1,0 +1,23 @@
+//! Files of several levels: pictures that are larger than a screen, of which a reader fetches the part and the level that
+//! are seen.
+//!
+//! Level 0 is the picture. Each further level has half the camera pixels and half the light elements along each axis, so
+//! that all levels together take about a third more than level 0. See `docs/format.md`, section 12.
+//!
+//! ```text
+//! geometry     geometry of a level        -> of the next level, of a shard
+//! coarsening   fine tiles                 -> coarse tile
+//! spool        shards and tiles           -> temporary file, and back
+//! writer       geometry, shards of level 0 -> levels, file
+//! reader       file, shard                 -> transport
+//! ```
+
+mod coarsening;
+mod geometry;
+mod reader;
+mod spool;
+mod writer;
+
+pub use reader::{PyramidReader, Shard};
+pub use spool::Spool;
+pub use writer::{PyramidLayout, SHARD_SIDE, level_count, write_pyramid};
