@@ -3,15 +3,16 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 use serde_json::value::RawValue;
 
-use super::ltm_file::open_ltm;
+use super::ltm_file::{LIMITS, open_ltm};
 use super::report::{format_bytes, format_shots, print_json, print_line};
 use crate::format::{FileIndex, Metadata, ScanCoding};
-use crate::transport::{Decibels, Extent};
+use crate::pyramid::PyramidReader;
+use crate::transport::{Decibels, Extent, TileRect};
 
 /// Show the contents of a relightable photograph; reads its file index only
 #[derive(Debug, Args)]
@@ -53,8 +54,51 @@ struct InspectReport {
     index_bytes: u64,
     largest_chunk_bytes: u32,
     scans: Vec<ProgressiveScanReport>,
+    /// Of a file of several levels, whose other fields but `file_bytes` are those of the last, the root.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    levels: Vec<LevelReport>,
     file_bytes: u64,
     metadata: Box<RawValue>,
+}
+
+/// A level of a file of several.
+#[derive(Serialize)]
+struct LevelReport {
+    camera: [u32; 2],
+    light: [u32; 2],
+    shards: usize,
+    bytes: u64,
+}
+
+impl LevelReport {
+    fn all(pyramid: &PyramidReader) -> Vec<Self> {
+        let table = pyramid.table();
+        let report = |level: u32| {
+            let Extent { width, height } = table.camera(level);
+            let extent = Extent { width, height };
+            let shards = pyramid.shards_in(level, TileRect { x: 0, y: 0, extent });
+            let ranges = shards.filter_map(|shard| pyramid.range(shard));
+            let bytes: Vec<u64> = ranges.map(|range| range.end - range.start).collect();
+            let light = table.light(level);
+            Self {
+                camera: [width, height],
+                light: [light.width, light.height],
+                shards: bytes.len(),
+                bytes: bytes.iter().sum(),
+            }
+        };
+        (0..table.levels()).map(report).collect()
+    }
+
+    fn print(&self, level: usize) -> Result<()> {
+        let [camera, light] = [self.camera, self.light].map(|[w, h]| format!("{w}x{h}"));
+        print_line(&format!(
+            "{:15} {level:<5} {camera:>13} {light:>13} {:>8} {:>12}",
+            "  level",
+            self.shards,
+            format_bytes(self.bytes),
+        ))
+    }
 }
 
 /// One scan, and the prefix of the file up to its end.
@@ -107,9 +151,10 @@ impl ProgressiveScanReport {
 
 pub fn run(args: &InspectArgs) -> Result<()> {
     let (file, index) = open_ltm(&args.file)?;
-    let declared = index.header.file_bytes;
-    let length = file.metadata().map_or(declared, |file| file.len());
     let name = args.file.display();
+    let pyramid = PyramidReader::new(index.clone(), LIMITS).with_context(|| name.to_string())?;
+    let declared = (pyramid.as_ref()).map_or(index.header.file_bytes, PyramidReader::file_bytes);
+    let length = file.metadata().map_or(declared, |file| file.len());
     if length < declared {
         eprintln!(
             "warning: {name}: is cut short after {length} of {declared} bytes; copy or download it again"
@@ -155,7 +200,8 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         scans: (0..index.scans.len())
             .map(|scan| ProgressiveScanReport::new(&index, scan))
             .collect(),
-        file_bytes: index.header.file_bytes,
+        levels: pyramid.as_ref().map_or(Vec::new(), LevelReport::all),
+        file_bytes: declared,
         metadata: RawValue::from_string(index.metadata.text().to_owned())?,
     };
     match args.json {
@@ -186,7 +232,12 @@ fn print(report: &InspectReport, metadata: &Metadata) -> Result<()> {
         report.factored_tiles,
         report.dark_tiles
     );
+    let picture = report.levels.first().map(|finest| {
+        let ([width, height], levels) = (finest.camera, report.levels.len());
+        format!("{width}x{height} in {levels} levels; what follows describes the last")
+    });
     for (name, value) in [
+        ("picture", picture.unwrap_or_default()),
         ("title", metadata.title.clone()),
         ("creator", metadata.creator.clone()),
         ("rights", metadata.rights.clone()),
@@ -213,6 +264,14 @@ fn print(report: &InspectReport, metadata: &Metadata) -> Result<()> {
         ))?;
     }
     report.scans.iter().try_for_each(|scan| scan.print())?;
+    if !report.levels.is_empty() {
+        print_line(&format!(
+            "{:15} {:5} {:>13} {:>13} {:>8} {:>12}",
+            "levels", "", "camera", "light", "shards", "bytes"
+        ))?;
+    }
+    let mut levels = report.levels.iter().enumerate();
+    levels.try_for_each(|(i, level)| level.print(i))?;
     line("file", &format_bytes(report.file_bytes))
 }
 

@@ -6,18 +6,18 @@ use std::num::ParseFloatError;
 use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 
 use super::value_parsers::ByteCount;
 use crate::format::{
-    ChunkSelection, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader, ReadProgress,
-    SectionName,
+    ChunkSelection, FileIndex, FormatError, HEADER_BYTES, LevelTable, Limits, LtmReader,
+    ReadProgress, SectionName,
 };
 use crate::transport::Transport;
 
 const READ_BYTES: usize = 1 << 20;
 /// More than in browsers, as a workstation has more memory than a tab.
-const LIMITS: Limits = Limits {
+pub const LIMITS: Limits = Limits {
     decoded_bytes: 16 << 30,
 };
 
@@ -28,7 +28,7 @@ pub struct LtmFile {
     pub progress: ReadProgress,
 }
 
-/// Reads and checks an `.ltm` file, or its prefix `first`.
+/// Reads and checks an `.ltm` file of one level, or its prefix `first`.
 pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
     let read = || -> Result<LtmFile> {
         let file = open(path)?;
@@ -44,6 +44,12 @@ pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
             );
             return Err(reader.truncated().into());
         };
+        if let Some(table) = LevelTable::read(&index)? {
+            bail!(
+                "has {} levels; this command reads files of one level, as before `encode`",
+                table.levels()
+            );
+        }
         let progress = reader.progress();
         let transport = fed.and_then(|()| match first {
             Some(_) => Ok(reader.finish_early()?),

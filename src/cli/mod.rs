@@ -8,6 +8,7 @@ mod assemble;
 mod calibrate;
 mod capture_writer;
 mod check;
+mod encode;
 mod evaluate;
 mod field_suggestion;
 mod file_hash;
@@ -56,6 +57,7 @@ enum Command {
     Photograph(photograph::PhotographArgs),
     Check(check::CheckArgs),
     Recover(recover::RecoverArgs),
+    Encode(encode::EncodeArgs),
     Evaluate(evaluate::EvaluateArgs),
     Report(quality_report::ReportArgs),
     Relight(relight::RelightArgs),
@@ -85,6 +87,7 @@ pub fn main() -> ExitCode {
         Command::Photograph(args) => photograph::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Encode(args) => encode::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Report(args) => quality_report::run(&args),
         Command::Relight(args) => relight::run(&args),

@@ -79,6 +79,11 @@ impl FileSignature {
     }
 }
 
+/// An error of what is read while an output is written, which names its file.
+#[derive(Debug, thiserror::Error)]
+#[error("{0:#}")]
+pub struct InputError(pub anyhow::Error);
+
 /// A file that is written under a temporary name beside its path and renamed when complete, so that the path never
 /// holds a partial file. It replaces a file of the same format only: any other is probably an input, given as output by
 /// mistake.
@@ -115,6 +120,17 @@ impl OutputFile {
         Ok(Self {
             path: path.to_owned(),
             file,
+        })
+    }
+
+    /// As [`finish`](Self::finish), but an [`InputError`] of `write` does not name the output.
+    pub fn finish_from_input(
+        self,
+        write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>,
+    ) -> Result<u64> {
+        self.finish(write).map_err(|error| match error.downcast() {
+            Ok(InputError(cause)) => cause,
+            Err(error) => error,
         })
     }
 

@@ -16,16 +16,16 @@ fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/glass-s")
 }
 
-fn run(args: &[&str]) -> Output {
+pub fn run(args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ltm-export"));
     command.args(args).output().unwrap()
 }
 
-fn text(path: &Path) -> &str {
+pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-fn json(args: &[&str]) -> Value {
+pub fn json(args: &[&str]) -> Value {
     let output = run(args);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{args:?}: {errors}");
@@ -33,7 +33,7 @@ fn json(args: &[&str]) -> Value {
 }
 
 /// Runs a command that must fail; returns its message.
-fn error_message(args: &[&str]) -> String {
+pub fn error_message(args: &[&str]) -> String {
     let output = run(args);
     assert_eq!(output.status.code(), Some(1), "{args:?}");
     assert!(output.stdout.is_empty(), "errors go to standard error");
@@ -97,7 +97,7 @@ fn recover_small_ltm(folder: &Path) -> PathBuf {
 }
 
 /// A small file, the same for all tests.
-fn small_ltm(folder: &Path) -> PathBuf {
+pub fn small_ltm(folder: &Path) -> PathBuf {
     static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
         let folder = TempDir::new().unwrap();
         fs::read(recover_small_ltm(folder.path())).unwrap()

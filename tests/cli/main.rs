@@ -9,6 +9,7 @@ mod acquisition;
 mod check;
 mod commands;
 mod import;
+mod levels;
 mod photo_files;
 mod photographs;
 mod reference;

@@ -1,0 +1,147 @@
+//! `ltm-export encode`: an `.ltm` file as one of several levels.
+
+use std::fs::File;
+use std::io::{self, ErrorKind};
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Context, Error, Result, bail, ensure};
+use clap::Args;
+use serde::Serialize;
+
+use super::ltm_file::{open_ltm, read_range};
+use super::output_file::{InputError, LTM, OutputFile, temporary_beside};
+use super::process_resources::{Interrupted, InterruptibleCores};
+use super::progress;
+use super::report::{format_bytes, print_json, print_line};
+use crate::format::{ChunkId, FormatError, LevelTable};
+use crate::pyramid::{PyramidLayout, SHARD_SIDE, Spool, level_count, write_pyramid};
+use crate::transport::Extent;
+
+/// Write a large relightable photograph as one of several levels, of which viewers fetch the part and the level that are
+/// seen
+///
+/// The element does not show such files yet.
+#[derive(Debug, Args)]
+pub struct EncodeArgs {
+    /// Relightable photograph of one level
+    #[arg(value_name = "FILE.ltm")]
+    file: PathBuf,
+    /// File to write; its finest level decodes to the same values as FILE.ltm
+    #[arg(short, long, value_name = "OUT.ltm")]
+    output: PathBuf,
+    /// Number of levels, each with half the pixels a side of the one before [default: down to at most 512 pixels, for
+    /// photographs of more than 1024]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=12))]
+    levels: Option<u32>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct EncodeReport {
+    levels: u32,
+    /// Of all levels, with the root.
+    shards: usize,
+    file_bytes: u64,
+    /// Bytes relative to those of the file of one level.
+    size_ratio: f64,
+}
+
+pub fn run(args: &EncodeArgs) -> Result<()> {
+    let cores = InterruptibleCores::listen()?;
+    let output = OutputFile::create(&args.output, &LTM)?;
+    let name = || args.file.display().to_string();
+    let (file, index) = open_ltm(&args.file)?;
+    ensure!(
+        !index.is_shard(),
+        "{}: is a shard of a larger file, which has levels already",
+        name()
+    );
+    if let Some(table) = LevelTable::read(&index).with_context(name)? {
+        bail!("{}: has {} levels already", name(), table.levels());
+    }
+    let file = Mutex::new(file);
+    let fetch = |chunk: ChunkId| {
+        let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+        let bytes = read_range(&mut file, index.range(chunk));
+        bytes.map_err(|error| FormatError::Source(io::Error::other(format!("{error:#}"))))
+    };
+    let layout = PyramidLayout {
+        levels: args
+            .levels(index.header.geometry.camera)
+            .with_context(name)?,
+        shard_side: SHARD_SIDE,
+    };
+    let temporary = || -> Result<Spool<File>> {
+        let (_, folder) = temporary_beside(&args.output, 0o600);
+        let file = tempfile::tempfile_in(folder).map_err(FormatError::Spool)?;
+        Ok(Spool::new(file))
+    };
+    let spools = [temporary(), temporary()]
+        .map(|spool| spool.with_context(|| args.output.display().to_string()));
+    let [shards_spool, tiles_spool] = spools;
+    let spools = [shards_spool?, tiles_spool?];
+    let spinner = progress::spinner("coarsening");
+    let mut shards = 1;
+    let file_bytes = output.finish_from_input(|out| {
+        let written = write_pyramid(&index, &fetch, layout, spools, &cores, out);
+        let table = written.map_err(|error| match error {
+            FormatError::Write(_) | FormatError::Spool(_) => error.into(),
+            FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => {
+                InputError(Interrupted("interrupted: nothing is written".to_owned()).into()).into()
+            }
+            other => Error::from(InputError(Error::new(other).context(name()))),
+        })?;
+        shards += table.shards().len();
+        Ok(())
+    })?;
+    drop(spinner);
+    let report = EncodeReport {
+        levels: layout.levels,
+        shards,
+        file_bytes,
+        size_ratio: file_bytes as f64 / index.header.file_bytes as f64,
+    };
+    match args.json {
+        true => print_json(&report),
+        false => report.print(args),
+    }
+}
+
+impl EncodeArgs {
+    /// The number of levels for a picture of `camera` pixels.
+    fn levels(&self, camera: Extent) -> Result<u32> {
+        let usual = level_count(camera);
+        let Some(levels) = self.levels else {
+            ensure!(
+                usual > 1,
+                "has {camera} pixels, for which one level is best; give --levels if you want more"
+            );
+            return Ok(usual);
+        };
+        // The last level is one shard.
+        let side = camera.width.max(camera.height);
+        let least = 1 + side.div_ceil(SHARD_SIDE).next_power_of_two().ilog2();
+        ensure!(
+            levels >= least,
+            "has {camera} pixels, which need --levels {least} or more"
+        );
+        Ok(levels)
+    }
+}
+
+impl EncodeReport {
+    fn print(&self, args: &EncodeArgs) -> Result<()> {
+        print_line(&format!(
+            "{}: {} levels in {} shards, {}, {:.2} times {}",
+            args.output.display(),
+            self.levels,
+            self.shards,
+            format_bytes(self.file_bytes),
+            self.size_ratio,
+            args.file.display()
+        ))
+    }
+}

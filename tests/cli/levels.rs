@@ -1,0 +1,241 @@
+//! Files of several levels on the command line.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::RgbImage;
+use tempfile::TempDir;
+
+use crate::commands::{error_message, json, run, small_ltm, text};
+
+/// A file of three levels in shards of 256 pixels; level 0 has 523 x 41.
+fn fixture() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/format/levels.ltm")
+}
+
+/// The picture of a file under a torch.
+fn relit(file: &Path, folder: &Path, args: &[&str]) -> RgbImage {
+    let out = folder.join("relit.png");
+    let start = ["relight", text(file), "--light", "torch", "-o", text(&out)];
+    let output = run(&[&start, args].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    image::open(out).unwrap().to_rgb8()
+}
+
+#[test]
+fn a_file_of_one_level_gets_more() {
+    let folder = TempDir::new().unwrap();
+    let flat = small_ltm(folder.path());
+    let message = error_message(&["encode", text(&flat), "-o", "x.ltm"]);
+    assert!(
+        message.contains("64x64 pixels") && message.contains("--levels"),
+        "{message}"
+    );
+    let file = folder.path().join("levels.ltm");
+    let encode = ["encode", text(&flat), "-o", text(&file), "--levels", "2"];
+    let report = json(&[&encode[..], &["--json"]].concat());
+    let file_bytes = fs::metadata(&file).unwrap().len();
+    assert_eq!(report["levels"], 2);
+    assert_eq!(report["shards"], 2);
+    assert_eq!(report["file_bytes"], file_bytes);
+    // No temporary file is left.
+    let files = fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(files, 2);
+
+    // Pictures of level 0 are those of the file of one level.
+    let before = relit(&flat, folder.path(), &["--at", "0.6,0.4"]);
+    assert_eq!(relit(&file, folder.path(), &["--at", "0.6,0.4"]), before);
+    // However coarse the root is, whose correspondence places the torch.
+    let coarse = folder.path().join("coarse.ltm");
+    json(&[
+        "encode",
+        text(&flat),
+        "-o",
+        text(&coarse),
+        "--levels",
+        "8",
+        "--json",
+    ]);
+    assert_eq!(relit(&coarse, folder.path(), &["--at", "0.6,0.4"]), before);
+    fs::remove_file(coarse).unwrap();
+    let half = relit(&file, folder.path(), &["--level", "1"]);
+    assert_eq!(half.dimensions(), (32, 32));
+    // Of light; the mean of codes is that of a tone curve.
+    let mean = |picture: &RgbImage| {
+        let light = |code: &u8| (f64::from(*code) / 255.0).powf(2.2);
+        picture.iter().map(light).sum::<f64>() / picture.len() as f64
+    };
+    let (whole, half) = (mean(&relit(&file, folder.path(), &[])), mean(&half));
+    assert!(
+        whole > 0.01 && (whole - half).abs() < 0.03 * whole,
+        "{whole} {half}"
+    );
+
+    let inspected = json(&["inspect", text(&file), "--json"]);
+    assert_eq!(
+        inspected["levels"][0]["camera"],
+        serde_json::json!([64, 64])
+    );
+    assert_eq!(inspected["levels"][1]["light"], serde_json::json!([16, 16]));
+    assert_eq!(inspected["file_bytes"], file_bytes);
+    let same = json(&["inspect", text(&flat), "--json"]);
+    assert_eq!(inspected["metadata"], same["metadata"]);
+    let message = error_message(&[
+        "encode",
+        text(&file),
+        "-o",
+        text(&folder.path().join("again.ltm")),
+    ]);
+    assert!(message.contains("2 levels already"), "{message}");
+}
+
+#[test]
+fn regions_of_levels_are_cut_out_of_their_pictures() {
+    let folder = TempDir::new().unwrap();
+    for (level, [width, height]) in [("0", [523, 41]), ("1", [262, 21]), ("2", [131, 11])] {
+        let args = ["--level", level, "--exposure", "8", "--at", "0.5,0.5"];
+        let whole = relit(&fixture(), folder.path(), &args);
+        assert_eq!(whole.dimensions(), (width, height));
+        assert!(
+            whole.iter().any(|code| *code > 100),
+            "level {level} is dark"
+        );
+        // Across a border of shards on levels 0 and 1.
+        let [x, y, w, h] = [width / 2 - 9, 3, 21, height - 5];
+        let region = format!("{x},{y},{w},{h}");
+        let part = relit(
+            &fixture(),
+            folder.path(),
+            &[&args[..], &["--region", &region]].concat(),
+        );
+        let expected = image::imageops::crop_imm(&whole, x, y, w, h).to_image();
+        assert!(part == expected, "level {level}");
+        let args = [&args[..], &["--backend", "reference"]].concat();
+        let reference = relit(&fixture(), folder.path(), &args);
+        let pairs = whole.iter().zip(reference.iter());
+        assert!(
+            pairs.map(|(a, b)| a.abs_diff(*b)).max() <= Some(1),
+            "level {level}"
+        );
+    }
+    let flat = small_ltm(folder.path());
+    let whole = relit(&flat, folder.path(), &[]);
+    let part = relit(&flat, folder.path(), &["--region", "10,20,30,40"]);
+    assert!(part == image::imageops::crop_imm(&whole, 10, 20, 30, 40).to_image());
+}
+
+#[test]
+fn wrong_levels_and_regions_are_refused_by_name() {
+    let folder = TempDir::new().unwrap();
+    let (flat, file) = (small_ltm(folder.path()), fixture());
+    let out = folder.path().join("x.png");
+    let message = |file: &Path, args: &[&str]| {
+        let start = ["relight", text(file), "--light", "flood", "-o", text(&out)];
+        error_message(&[&start, args].concat())
+    };
+    for (file, args, words) in [
+        (&file, &["--level", "3"][..], ["levels 0 to 2", "--level 3"]),
+        (&flat, &["--level", "1"], ["one level", "--level 1"]),
+        (
+            &file,
+            &["--region", "500,0,24,10"],
+            ["523x41", "500,0,24,10"],
+        ),
+        (
+            &file,
+            &["--level", "2", "--region", "0,0,1,12"],
+            ["131x11", "level 2"],
+        ),
+        (&flat, &["--region", "0,0,65,1"], ["64x64", "0,0,65,1"]),
+        (
+            &flat,
+            &["--region", "4294967295,0,2,1"],
+            ["64x64", "4294967295"],
+        ),
+    ] {
+        let message = message(file, args);
+        assert!(words.iter().all(|word| message.contains(word)), "{message}");
+    }
+    for (region, word) in [
+        ("1,2,3", "four whole numbers"),
+        ("0,0,0,5", "four whole numbers"),
+    ] {
+        let start = ["relight", text(&file), "--light", "flood", "-o", text(&out)];
+        let output = run(&[&start[..], &["--region", region]].concat());
+        assert_eq!(output.status.code(), Some(2));
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(message.contains(word), "{message}");
+    }
+    let capture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/glass-s");
+    let message = error_message(&["evaluate", text(&file), text(&capture)]);
+    assert!(
+        message.contains("3 levels") && message.contains("one level"),
+        "{message}"
+    );
+    let first = run(&[
+        "relight",
+        text(&file),
+        "--light",
+        "flood",
+        "-o",
+        text(&out),
+        "--first",
+        "9K",
+    ]);
+    assert_eq!(first.status.code(), Some(2));
+}
+
+#[test]
+fn damaged_shards_are_found_and_named() {
+    let folder = TempDir::new().unwrap();
+    let report = json(&["verify", text(&fixture()), "--json"]);
+    assert_eq!(
+        (&report["levels"], &report["shards"]),
+        (&3.into(), &6.into())
+    );
+    let bytes = fs::read(fixture()).unwrap();
+    let path = folder.path().join("damaged.ltm");
+    let verify = |edit: &dyn Fn(&mut Vec<u8>)| {
+        let mut damaged = bytes.clone();
+        edit(&mut damaged);
+        fs::write(&path, damaged).unwrap();
+        error_message(&["verify", text(&path)])
+    };
+    let message = verify(&|file| *file.last_mut().unwrap() ^= 1);
+    assert!(
+        message.contains("shard 2, 0 of level 0") && message.contains("checksum"),
+        "{message}"
+    );
+    // Shards after one whose index is damaged are checked too.
+    let shard = bytes.windows(4).position(|bytes| bytes == b"SHRD").unwrap();
+    let message = verify(&|file| {
+        file[shard + 8] ^= 1;
+        *file.last_mut().unwrap() ^= 1;
+    });
+    assert!(
+        message.contains("2 of ") && message.contains("of level 1"),
+        "{message}"
+    );
+    let message = verify(&|file| file.truncate(bytes.len() - 1));
+    assert!(message.contains("cut short"), "{message}");
+    let out = folder.path().join("x.png");
+    let relight = ["relight", text(&path), "--light", "flood", "-o", text(&out)];
+    let message = error_message(&relight);
+    assert!(
+        message.starts_with(&format!("error: {}: shard", path.display())),
+        "{message}"
+    );
+    assert!(!out.exists());
+    let message = verify(&|file| file.push(0));
+    assert!(
+        message.contains(&format!("byte {}", bytes.len())),
+        "{message}"
+    );
+    fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+    let inspected = run(&["inspect", text(&path)]);
+    let message = String::from_utf8_lossy(&inspected.stderr).into_owned();
+    assert!(message.contains("cut short"), "{message}");
+    let shown = String::from_utf8(inspected.stdout).unwrap();
+    assert!(shown.contains("523x41 in 3 levels"), "{shown}");
+}
