@@ -14,6 +14,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed benchmark should panic
 
 mod figures;
+mod simulated_capture;
 
 use std::fs;
 use std::io::BufWriter;
@@ -31,6 +32,7 @@ use relightable_photo::transport::{Basis, CHANNELS, Decibels, FloatTile, SnrAccu
 use serde_json::{Value, json};
 
 use figures::Figures;
+use simulated_capture::{ltm_export, simulated};
 
 /// Lossless peers that code the band.
 const LOSSLESS_PEERS: [&str; 4] = ["band_f16_zstd19", "dense_f16_zstd19", "csr_npz", "blosc2"];
@@ -40,37 +42,15 @@ const IMAGE_PEERS: [&str; 2] = ["jpeg_planes", "webp_planes"];
 fn main() {
     let folder = figures::folder();
     let mut figures = Figures::new();
-    let capture = simulated(&folder, "quarter-scale", 128);
+    let capture = simulated(&folder, "quarter-scale", "stained-glass", 128);
     let small = loss(&folder, "quarter", &capture, &mut figures);
     prefix(&small, &capture, &mut figures);
     against_peers(&folder, &small, &mut figures);
     rates(&small, &mut figures);
-    let capture = simulated(&folder, "paper-scale", 512);
+    let capture = simulated(&folder, "paper-scale", "stained-glass", 512);
     let large = loss(&folder, "paper", &capture, &mut figures);
     wasm_rate(&large.file, &mut figures);
     figures::report("format", &figures);
-}
-
-fn ltm_export(args: &[&str]) -> Value {
-    let output = Command::new(env!("CARGO_BIN_EXE_ltm-export"))
-        .args(args)
-        .stderr(Stdio::inherit())
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{args:?}");
-    serde_json::from_slice(&output.stdout).unwrap_or(Value::Null)
-}
-
-/// A simulated capture of stained glass, with two camera pixels along each side of a light element, under 80 patterns.
-fn simulated(folder: &Path, name: &str, side: u32) -> PathBuf {
-    let capture = folder.join(name);
-    if !capture.join("capture.json").exists() {
-        let [camera, light] = [side, side / 2].map(|side| format!("{side}x{side}"));
-        let grids = ["--camera", &camera, "--light", &light, "--patterns", "80"];
-        let command = ["simulate", "stained-glass", "-o", capture.to_str().unwrap()];
-        ltm_export(&[&command[..], &grids].concat());
-    }
-    capture
 }
 
 /// A default file, and a lossless file of the same recovery.

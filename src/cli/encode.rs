@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 use anyhow::{Context, Error, Result, bail, ensure};
 use clap::Args;
@@ -11,7 +12,7 @@ use serde::Serialize;
 
 use super::ltm_file::{open_ltm, read_range};
 use super::output_file::{InputError, LTM, OutputFile, temporary_beside};
-use super::process_resources::{Interrupted, InterruptibleCores};
+use super::process_resources::{Interrupted, InterruptibleCores, peak_rss_bytes};
 use super::progress;
 use super::report::{format_bytes, print_json, print_line};
 use crate::format::{ChunkId, FormatError, LevelTable};
@@ -44,12 +45,15 @@ struct EncodeReport {
     levels: u32,
     /// Of all levels, with the root.
     shards: usize,
+    seconds: f64,
+    peak_rss_bytes: Option<u64>,
     file_bytes: u64,
     /// Bytes relative to those of the file of one level.
     size_ratio: f64,
 }
 
 pub fn run(args: &EncodeArgs) -> Result<()> {
+    let start = Instant::now();
     let cores = InterruptibleCores::listen()?;
     let output = OutputFile::create(&args.output, &LTM)?;
     let name = || args.file.display().to_string();
@@ -101,6 +105,8 @@ pub fn run(args: &EncodeArgs) -> Result<()> {
     let report = EncodeReport {
         levels: layout.levels,
         shards,
+        seconds: start.elapsed().as_secs_f64(),
+        peak_rss_bytes: peak_rss_bytes(),
         file_bytes,
         size_ratio: file_bytes as f64 / index.header.file_bytes as f64,
     };

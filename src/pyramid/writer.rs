@@ -306,17 +306,20 @@ impl<F: Read + Write + Seek + Send, E: Executor> PyramidWriter<'_, F, E> {
         let count = shard.tile_grid().area();
         let mut places = Vec::with_capacity(count);
         let origin = shard.correspondence.origin.camera;
-        for first in (0..count).step_by(BATCH_TILES) {
-            let tiles = self.executor.map(BATCH_TILES.min(count - first), |i| {
-                self.coarse_tile(levels, fine, moved(shard.tile(first + i), origin))
+        // A job returns the place of its tile, not the tile, which can take a hundred megabytes.
+        let make = |i: usize| {
+            let tile = self.coarse_tile(levels, fine, moved(shard.tile(i), origin));
+            let tile = tile.map_err(FormatError::Source)?;
+            let place = (!tile.is_dark()).then(|| {
+                let record = encode_record(&tile);
+                self.tiles.append(|out| out.write_all(&record))
             });
-            for tile in tiles {
-                let tile = tile.map_err(FormatError::Source)?;
-                let place = (!tile.is_dark()).then(|| {
-                    let record = encode_record(&tile);
-                    self.tiles.append(|out| out.write_all(&record))
-                });
-                places.push(place.transpose()?);
+            place.transpose()
+        };
+        for first in (0..count).step_by(BATCH_TILES) {
+            let batch = BATCH_TILES.min(count - first);
+            for place in self.executor.map(batch, |i| make(first + i)) {
+                places.push(place?);
             }
         }
         let tile = |i: usize| {
