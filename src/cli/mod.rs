@@ -26,11 +26,13 @@ mod progress;
 mod quality_report;
 mod recover;
 mod relight;
+mod relit_picture;
 mod report;
 mod shoot;
 mod simulate;
 mod study;
 mod study_faults;
+mod tiles;
 mod value_parsers;
 mod verify;
 
@@ -61,6 +63,7 @@ enum Command {
     Evaluate(evaluate::EvaluateArgs),
     Report(quality_report::ReportArgs),
     Relight(relight::RelightArgs),
+    Tiles(tiles::TilesArgs),
     Inspect(inspect::InspectArgs),
     Verify(verify::VerifyArgs),
     Study(study::StudyArgs),
@@ -91,6 +94,7 @@ pub fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Report(args) => quality_report::run(&args),
         Command::Relight(args) => relight::run(&args),
+        Command::Tiles(args) => tiles::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Study(args) => study::run(&args),

@@ -19,3 +19,4 @@ mod simulate;
 #[cfg(unix)]
 mod streaming;
 mod study;
+mod tiles;

@@ -2,12 +2,11 @@
 
 use std::cell::RefCell;
 use std::fs::File;
-use std::io::Write;
 use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
 
-use super::{Colors, RelightArgs, write_png};
+use super::{Colors, PictureArgs};
 use crate::cli::ltm_file::{LIMITS, read_range};
 use crate::cli::output_file::InputError;
 use crate::pyramid::{PyramidReader, Shard};
@@ -18,76 +17,76 @@ use crate::transport::{Extent, LightPosition, TileRect};
 const LIGHT_ELEMENT_BYTES: u64 = 16;
 
 /// A level of a file of several.
-pub struct Level {
+pub struct Level<'a> {
+    args: &'a PictureArgs,
     file: RefCell<File>,
     reader: PyramidReader,
-    region: TileRect,
 }
 
-impl Level {
-    /// The level and the region that `args` ask for.
-    pub fn new(args: &RelightArgs, file: File, reader: PyramidReader) -> Result<Self> {
+impl<'a> Level<'a> {
+    /// The level that `args` ask for.
+    pub fn new(args: &'a PictureArgs, file: File, reader: PyramidReader) -> Result<Self> {
+        let number = args.level;
         let levels = reader.table().levels();
         ensure!(
-            args.level < levels,
-            "{}: has levels 0 to {}; there is no --level {}",
+            number < levels,
+            "{}: has levels 0 to {}; there is no --level {number}",
             args.file.display(),
             levels - 1,
-            args.level
         );
         Ok(Self {
-            region: args.region_in(reader.table().camera(args.level))?,
+            args,
             file: RefCell::new(file),
             reader,
         })
     }
 
-    /// Relights the region, and writes it as a PNG.
-    pub fn write(&self, args: &RelightArgs, out: &mut impl Write) -> Result<()> {
-        let colors = Colors::new(args, self.reader.root()).map_err(InputError)?;
-        let light = colors.convert(self.light(args).map_err(InputError)?);
-        let region = self.region;
-        write_png(out, region.extent, |write_rows| {
-            let side = self.reader.table().shard_side();
-            let (mut y, end) = (region.y, region.y + region.extent.height);
-            while y < end {
-                let next = (y / side * side).saturating_add(side).min(end);
-                let rows = TileRect {
-                    y,
-                    extent: Extent::new(region.extent.width, next - y),
-                    ..region
-                };
-                let picture = self.relight_rows(args, rows, &light, &colors);
-                let picture = picture.map_err(InputError)?;
-                let (x, y_in_picture) = (0, 0);
-                write_rows(
-                    &picture,
-                    TileRect {
-                        x,
-                        y: y_in_picture,
-                        extent: rows.extent,
-                    },
-                )?;
-                y = next;
-            }
-            Ok(())
-        })
+    /// Its pixels.
+    pub fn camera(&self) -> Extent {
+        self.reader.table().camera(self.args.level)
+    }
+
+    /// Draws a region, row by row.
+    pub fn draw(
+        &self,
+        region: TileRect,
+        row: &mut dyn FnMut(&[[u8; 4]]) -> Result<()>,
+    ) -> Result<()> {
+        let colors = Colors::new(self.args, self.reader.root()).map_err(InputError)?;
+        let light = colors.convert(self.light().map_err(InputError)?);
+        let side = self.reader.table().shard_side();
+        let (mut y, end) = (region.y, region.y + region.extent.height);
+        while y < end {
+            let next = (y / side * side).saturating_add(side).min(end);
+            let rows = TileRect {
+                y,
+                extent: Extent::new(region.extent.width, next - y),
+                ..region
+            };
+            let picture = self.relight_rows(rows, &light, &colors);
+            let picture = picture.map_err(InputError)?;
+            let mut rows = picture.pixels.chunks_exact(region.extent.width as usize);
+            rows.try_for_each(&mut *row)?;
+            y = next;
+        }
+        Ok(())
     }
 
     /// The light on the light plane of the level.
-    fn light(&self, args: &RelightArgs) -> Result<Light> {
+    fn light(&self) -> Result<Light> {
+        let (args, number) = (self.args, self.args.level);
         let table = self.reader.table();
-        let plane = table.light(args.level);
+        let plane = table.light(number);
         // Unlike a shard, it is in memory as a whole.
         let fits = |level: u32| {
             let Extent { width, height } = table.light(level);
             u64::from(width) * u64::from(height) * LIGHT_ELEMENT_BYTES <= LIMITS.decoded_bytes
         };
         ensure!(
-            fits(args.level),
+            fits(number),
             "{}: level {} has {plane} light elements, which do not fit in memory; give a larger --level",
             args.file.display(),
-            args.level
+            number
         );
         let Some([x, y]) = args.at else {
             return args.light_on(plane);
@@ -99,7 +98,7 @@ impl Level {
             x * f64::from(whole.width) / level_0,
             y * f64::from(whole.height) / level_0,
         );
-        let elements = f64::from(1 << (table.levels() - 1 - args.level));
+        let elements = f64::from(1 << (table.levels() - 1 - number));
         let centre = LightPosition {
             u: u * elements,
             v: v * elements,
@@ -112,23 +111,17 @@ impl Level {
     }
 
     /// The picture of some rows, which lie in one row of shards.
-    fn relight_rows(
-        &self,
-        args: &RelightArgs,
-        rows: TileRect,
-        light: &Light,
-        colors: &Colors,
-    ) -> Result<Rgba8Picture> {
+    fn relight_rows(&self, rows: TileRect, light: &Light, colors: &Colors) -> Result<Rgba8Picture> {
         let fetch = |range: Range<u64>| read_range(&mut self.file.borrow_mut(), range);
         let mut picture = Rgba8Picture::filled(rows.extent, [0; 4]);
         let width = rows.extent.width as usize;
-        for id in self.reader.shards_in(args.level, rows) {
+        for id in self.reader.shards_in(self.args.level, rows) {
             let shard = self.reader.shard(id, rows, fetch);
             let Shard { rect, transport } =
-                shard.with_context(|| format!("{}: {id}", args.file.display()))?;
+                shard.with_context(|| format!("{}: {id}", self.args.file.display()))?;
             let geometry = &transport.geometry;
             let light = light.crop(geometry.correspondence.origin.light, geometry.light);
-            let relit = args.backend.picture(transport, &light, colors);
+            let relit = self.args.backend.picture(transport, &light, colors);
             let [left, right] = [rows.x, rows.x + rows.extent.width]
                 .map(|x| x.clamp(rect.x, rect.x + rect.extent.width));
             for y in rows.y..rows.y + rows.extent.height {

@@ -1,10 +1,10 @@
-//! `ltm-export relight`: a picture of the object under a light, as a PNG.
+//! A picture of the object under a light, for the commands that write pictures. Of a file of several levels, which may be larger
+//! than memory, it is drawn one row of shards at a time.
 
 mod level;
 mod light_image;
 
-use std::io::Write;
-use std::num::{ParseFloatError, ParseIntError};
+use std::num::ParseFloatError;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -13,8 +13,8 @@ use clap::{Args, ValueEnum};
 
 use self::level::Level;
 use self::light_image::load_light;
-use super::ltm_file::{LIMITS, PrefixLength, open_ltm, read_ltm};
-use super::output_file::{OutputFile, PNG};
+use super::ltm_file::{LIMITS, LtmFile, PrefixLength, open_ltm, read_ltm};
+use super::output_file::InputError;
 use super::process_resources::AllCoresExecutor;
 use super::value_parsers::{UsageError, parse_number};
 use crate::format::FileIndex;
@@ -23,9 +23,9 @@ use crate::relight::cpu::CpuRelighter;
 use crate::relight::{Light, OutputTransform, Rgba8Picture, TorchSpot, reference};
 use crate::transport::{ColorMatrix, Extent, TileRect, Transport, light_color_matrix};
 
-/// Relight an object and write the picture as an 8-bit sRGB PNG
+/// A file, and the light to show it under.
 #[derive(Debug, Args)]
-pub struct RelightArgs {
+pub struct PictureArgs {
     /// Relightable photograph
     #[arg(value_name = "FILE.ltm")]
     file: PathBuf,
@@ -42,21 +42,12 @@ pub struct RelightArgs {
     /// Brightness factor
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| parse_number(text, 0.0, 1e6))]
     exposure: f32,
-    /// Use only the first part of the file, as a page does while it loads: 20K, 10%
-    #[arg(long, value_name = "BYTES|PERCENT", value_parser = PrefixLength::parse)]
-    first: Option<PrefixLength>,
     /// Level of a file of several: each has half the pixels of the one before
     #[arg(long, value_name = "K", default_value_t = 0)]
     level: u32,
-    /// Pixels of the level to write: column and row of the first, width and height [default: all]
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_region)]
-    region: Option<TileRect>,
     /// Implementation that computes the picture
     #[arg(long, value_enum, default_value_t = RelightImplementation::Cpu)]
     backend: RelightImplementation,
-    /// PNG to write
-    #[arg(short, long, value_name = "OUT.png")]
-    output: PathBuf,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -75,17 +66,6 @@ fn parse_position(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-fn parse_region(text: &str) -> Result<TileRect, String> {
-    let parts: Result<Vec<u32>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    match parts.map_err(|e: ParseIntError| e.to_string())?[..] {
-        [x, y, width, height] if width > 0 && height > 0 => {
-            let extent = Extent { width, height };
-            Ok(TileRect { x, y, extent })
-        }
-        _ => Err("expected four whole numbers, as in 0,0,800,600".to_owned()),
-    }
-}
-
 fn parse_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds.is_finite() => Ok(seconds),
@@ -93,49 +73,18 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-pub fn run(args: &RelightArgs) -> Result<()> {
-    if args.at.is_some() && args.light != "torch" {
-        return Err(UsageError("--at goes with --light torch").into());
-    }
-    if args.time.is_some() && args.light != "fire" {
-        return Err(UsageError("--time goes with --light fire").into());
-    }
-    let output = OutputFile::create(&args.output, &PNG)?;
-    let (file, index) = open_ltm(&args.file)?;
-    let name = || args.file.display().to_string();
-    if let Some(reader) = PyramidReader::new(index, LIMITS).with_context(name)? {
-        if args.first.is_some() {
-            return Err(UsageError("--first goes with files of one level").into());
+impl PictureArgs {
+    /// Refuses options that do not go with the light.
+    pub fn check(&self) -> Result<(), UsageError> {
+        if self.at.is_some() && self.light != "torch" {
+            return Err(UsageError("--at goes with --light torch"));
         }
-        let level = Level::new(args, file, reader)?;
-        output.finish_from_input(|out| level.write(args, out))?;
-        return Ok(());
+        match self.time.is_some() && self.light != "fire" {
+            true => Err(UsageError("--time goes with --light fire")),
+            false => Ok(()),
+        }
     }
-    ensure!(
-        args.level == 0,
-        "{}: has one level; leave out --level {}",
-        name(),
-        args.level
-    );
-    let file = read_ltm(&args.file, args.first)?;
-    if args.first.is_some() {
-        let (bytes, complete) = (file.progress.bytes, file.progress.scans);
-        let scans = file.index.scans.len();
-        eprintln!("note: {complete} of {scans} scans are complete in these {bytes} bytes");
-    }
-    let geometry = &file.index.header.geometry;
-    let region = args.region_in(geometry.camera)?;
-    let colors = Colors::new(args, &file.index)?;
-    let light = colors.convert(match args.at {
-        Some([x, y]) => Light::torch(geometry.light, TorchSpot::behind(geometry, x, y)),
-        None => args.light_on(geometry.light)?,
-    });
-    let picture = args.backend.picture(file.transport, &light, &colors);
-    output.finish(|out| write_png(out, region.extent, |rows| rows(&picture, region)))?;
-    Ok(())
-}
 
-impl RelightArgs {
     /// The light, but a torch that was placed, on a light plane.
     fn light_on(&self, plane: Extent) -> Result<Light> {
         match self.time {
@@ -143,9 +92,20 @@ impl RelightArgs {
             None => load_light(&self.light, plane),
         }
     }
+}
 
-    /// The pixels to write of a picture.
-    fn region_in(&self, camera: Extent) -> Result<TileRect> {
+/// The part of a file to show.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PicturePart {
+    /// Pixels; all if left out.
+    pub region: Option<TileRect>,
+    /// Of a file of one level.
+    pub first: Option<PrefixLength>,
+}
+
+impl PicturePart {
+    /// The pixels of the level of `args`, which has `camera`.
+    fn region_in(&self, args: &PictureArgs, camera: Extent) -> Result<TileRect> {
         let Some(region) = self.region else {
             let (x, y, extent) = (0, 0, camera);
             return Ok(TileRect { x, y, extent });
@@ -154,13 +114,96 @@ impl RelightArgs {
         ensure!(
             region.is_within(camera),
             "{}: level {} has {camera} pixels; --region {x},{y},{},{} is not within them",
-            self.file.display(),
-            self.level,
+            args.file.display(),
+            args.level,
             extent.width,
             extent.height
         );
         Ok(region)
     }
+}
+
+/// A picture that is about to be drawn.
+pub struct RelitPicture<'a> {
+    args: &'a PictureArgs,
+    source: Source<'a>,
+    region: TileRect,
+}
+
+enum Source<'a> {
+    Whole(Box<LtmFile>),
+    Level(Box<Level<'a>>),
+}
+
+impl<'a> RelitPicture<'a> {
+    /// Opens the file of `args`.
+    pub fn open(args: &'a PictureArgs, part: &PicturePart) -> Result<Self> {
+        let (file, index) = open_ltm(&args.file)?;
+        let name = || args.file.display().to_string();
+        if let Some(reader) = PyramidReader::new(index, LIMITS).with_context(name)? {
+            if part.first.is_some() {
+                return Err(UsageError("--first goes with files of one level").into());
+            }
+            let level = Level::new(args, file, reader)?;
+            return Ok(Self {
+                args,
+                region: part.region_in(args, level.camera())?,
+                source: Source::Level(Box::new(level)),
+            });
+        }
+        ensure!(
+            args.level == 0,
+            "{}: has one level; leave out --level {}",
+            name(),
+            args.level
+        );
+        let file = read_ltm(&args.file, part.first)?;
+        if part.first.is_some() {
+            let (bytes, complete) = (file.progress.bytes, file.progress.scans);
+            let scans = file.index.scans.len();
+            eprintln!("note: {complete} of {scans} scans are complete in these {bytes} bytes");
+        }
+        Ok(Self {
+            args,
+            region: part.region_in(args, file.index.header.geometry.camera)?,
+            source: Source::Whole(Box::new(file)),
+        })
+    }
+
+    /// Width and height.
+    pub fn extent(&self) -> Extent {
+        self.region.extent
+    }
+
+    /// Draws the picture: calls `row` with each row of pixels from top to bottom. Errors of the file are [`InputError`]s.
+    pub fn draw(self, row: &mut dyn FnMut(&[[u8; 4]]) -> Result<()>) -> Result<()> {
+        let Self {
+            args,
+            source,
+            region,
+        } = self;
+        match source {
+            Source::Level(level) => level.draw(region, row),
+            Source::Whole(file) => {
+                let (picture, region) = (relight(args, *file).map_err(InputError)?, region);
+                (region.y..region.y + region.extent.height).try_for_each(|y| {
+                    let start = y as usize * picture.extent.width as usize + region.x as usize;
+                    row(&picture.pixels[start..start + region.extent.width as usize])
+                })
+            }
+        }
+    }
+}
+
+/// The whole picture of a file of one level.
+fn relight(args: &PictureArgs, file: LtmFile) -> Result<Rgba8Picture> {
+    let geometry = &file.index.header.geometry;
+    let colors = Colors::new(args, &file.index)?;
+    let light = colors.convert(match args.at {
+        Some([x, y]) => Light::torch(geometry.light, TorchSpot::behind(geometry, x, y)),
+        None => args.light_on(geometry.light)?,
+    });
+    Ok(args.backend.picture(file.transport, &light, &colors))
 }
 
 /// How lights and pictures of a file are coloured.
@@ -171,7 +214,7 @@ struct Colors {
 }
 
 impl Colors {
-    fn new(args: &RelightArgs, index: &FileIndex) -> Result<Self> {
+    fn new(args: &PictureArgs, index: &FileIndex) -> Result<Self> {
         let mut transform = OutputTransform::srgb(args.exposure);
         let color_matrix = index.metadata.read()?.color_matrix;
         if let Some(color_matrix) = &color_matrix {
@@ -203,29 +246,4 @@ impl RelightImplementation {
             Self::Reference => reference::picture(&transport, light, transform),
         }
     }
-}
-
-/// Writes a PNG, whose rows `draw` gives from top to bottom: parts of pictures.
-fn write_png(
-    out: &mut impl Write,
-    extent: Extent,
-    draw: impl FnOnce(&mut dyn FnMut(&Rgba8Picture, TileRect) -> Result<()>) -> Result<()>,
-) -> Result<()> {
-    const FAILED: &str = "cannot be encoded";
-    let mut encoder = png::Encoder::new(out, extent.width, extent.height);
-    encoder.set_color(png::ColorType::Rgb);
-    let mut writer = encoder.write_header().context(FAILED)?;
-    let mut stream = writer.stream_writer().context(FAILED)?;
-    let mut row = Vec::with_capacity(3 * extent.width as usize);
-    draw(&mut |picture, part| {
-        for y in part.y..part.y + part.extent.height {
-            let start = y as usize * picture.extent.width as usize + part.x as usize;
-            let pixels = &picture.pixels[start..start + part.extent.width as usize];
-            row.clear();
-            row.extend(pixels.iter().flat_map(|&[r, g, b, _]| [r, g, b]));
-            stream.write_all(&row).context(FAILED)?;
-        }
-        Ok(())
-    })?;
-    stream.finish().context(FAILED)
 }
