@@ -297,7 +297,7 @@ fn damaged_tables_and_shards_are_refused() {
         y: 0,
         extent: Extent::new(600, 299),
     };
-    // A shard where another belongs, one that is cut, and one that is damaged.
+    // The place of another shard, a cut file, and a damaged header.
     let read = |file: &[u8], id| {
         let fetch = |range| Ok::<_, FormatError>(bytes_at(file, range));
         reader.shard(id, rect, fetch).map(drop)

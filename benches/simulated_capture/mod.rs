@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-/// Runs a command of `ltm-export`; returns what it prints, if that is JSON.
+/// Runs a command of `ltm-export`; returns the JSON that it prints, or null.
 pub fn ltm_export(args: &[&str]) -> Value {
     let output = Command::new(env!("CARGO_BIN_EXE_ltm-export"))
         .args(args)

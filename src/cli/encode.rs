@@ -16,7 +16,9 @@ use super::process_resources::{Interrupted, InterruptibleCores, peak_rss_bytes};
 use super::progress;
 use super::report::{format_bytes, print_json, print_line};
 use crate::format::{ChunkId, FormatError, LevelTable};
-use crate::pyramid::{PyramidLayout, SHARD_SIDE, Spool, level_count, write_pyramid};
+use crate::pyramid::{
+    PyramidLayout, SHARD_SIDE, Spool, least_level_count, level_count, write_pyramid,
+};
 use crate::transport::Extent;
 
 /// Write a large relightable photograph as one of several levels, of which viewers fetch the part and the level that are
@@ -80,13 +82,12 @@ pub fn run(args: &EncodeArgs) -> Result<()> {
     };
     let temporary = || -> Result<Spool<File>> {
         let (_, folder) = temporary_beside(&args.output, 0o600);
-        let file = tempfile::tempfile_in(folder).map_err(FormatError::Spool)?;
-        Ok(Spool::new(file))
+        let file = tempfile::tempfile_in(folder).map_err(FormatError::Spool);
+        Ok(Spool::new(
+            file.with_context(|| args.output.display().to_string())?,
+        ))
     };
-    let spools = [temporary(), temporary()]
-        .map(|spool| spool.with_context(|| args.output.display().to_string()));
-    let [shards_spool, tiles_spool] = spools;
-    let spools = [shards_spool?, tiles_spool?];
+    let spools = [temporary()?, temporary()?];
     let spinner = progress::spinner("coarsening");
     let mut shards = 1;
     let file_bytes = output.finish_from_input(|out| {
@@ -128,8 +129,7 @@ impl EncodeArgs {
             return Ok(usual);
         };
         // The last level is one shard.
-        let side = camera.width.max(camera.height);
-        let least = 1 + side.div_ceil(SHARD_SIDE).next_power_of_two().ilog2();
+        let least = least_level_count(camera, SHARD_SIDE);
         ensure!(
             levels >= least,
             "has {camera} pixels, which need --levels {least} or more"

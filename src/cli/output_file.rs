@@ -79,10 +79,20 @@ impl FileSignature {
     }
 }
 
-/// An error of what is read while an output is written, which names its file.
+/// An error in reading an input while an output is written. It names the input.
 #[derive(Debug, thiserror::Error)]
 #[error("{0:#}")]
 pub struct InputError(pub anyhow::Error);
+
+impl InputError {
+    /// The error without the name of the output, if it is one of the input.
+    pub fn without_output(error: anyhow::Error) -> anyhow::Error {
+        match error.downcast() {
+            Ok(Self(cause)) => cause,
+            Err(error) => error,
+        }
+    }
+}
 
 /// A file that is written under a temporary name beside its path and renamed when complete, so that the path never
 /// holds a partial file. It replaces a file of the same format only: any other is probably an input, given as output by
@@ -128,10 +138,7 @@ impl OutputFile {
         self,
         write: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>,
     ) -> Result<u64> {
-        self.finish(write).map_err(|error| match error.downcast() {
-            Ok(InputError(cause)) => cause,
-            Err(error) => error,
-        })
+        self.finish(write).map_err(InputError::without_output)
     }
 
     /// Writes the file and renames it to its path. Returns its length.

@@ -37,7 +37,7 @@ struct VerifyReport {
     contents: Option<FileTotals>,
 }
 
-#[derive(Clone, Serialize)]
+#[derive(Serialize)]
 struct FileTotals {
     levels: u32,
     /// Of all levels, with the root.
@@ -104,13 +104,12 @@ fn verify(args: &VerifyArgs, report: &mut VerifyReport) -> Result<()> {
             (Some(shard), Some(pyramid)) => {
                 let index = pyramid.index(shard, |range| read_range(&mut file, range));
                 let range = pyramid.range(shard).unwrap_or_default();
-                let start = range.start;
                 match index {
-                    Ok(index) => (index, start),
+                    Ok(index) => (index, range.start),
                     Err(error) => {
                         parts += 1;
                         report.bad_parts += 1;
-                        first.get_or_insert((shard.into(), None, range, error));
+                        first.get_or_insert((Some(shard), None, range, error));
                         continue;
                     }
                 }

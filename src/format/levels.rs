@@ -57,10 +57,7 @@ impl std::fmt::Display for ShardId {
 /// The table of a file of several levels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LevelTable {
-    camera: Extent,
-    light: Extent,
-    levels: u32,
-    shard_side: u32,
+    grids: Grids,
     /// All shards but the root, in file order.
     shards: Vec<ShardId>,
     /// Where each shard begins, and where the last ends, from the end of the root on.
@@ -94,18 +91,8 @@ impl LevelTable {
             shards.extend(cells.map(|(x, y)| ShardId { level, x, y }));
             shards[first..].sort_unstable_by_key(order);
         }
-        let Grids {
-            camera,
-            light,
-            levels,
-            shard_side,
-            ..
-        } = grids;
         Self {
-            camera,
-            light,
-            levels,
-            shard_side,
+            grids,
             shards,
             offsets: vec![0; count + 1],
         }
@@ -162,8 +149,9 @@ impl LevelTable {
 
     /// The extension, which readers must understand.
     pub fn extension(&self) -> FormatExtension {
-        let [camera, light] = [self.camera, self.light].map(|grid| [grid.width, grid.height]);
-        let fixed = [camera, light, [self.levels, self.shard_side]];
+        let [camera, light] =
+            [self.grids.camera, self.grids.light].map(|grid| [grid.width, grid.height]);
+        let fixed = [camera, light, [self.levels(), self.shard_side()]];
         let lengths = self
             .offsets
             .windows(2)
@@ -183,22 +171,27 @@ impl LevelTable {
 
     /// Number of levels, with the root.
     pub fn levels(&self) -> u32 {
-        self.levels
+        self.grids.levels
     }
 
     /// Side of the shards, in pixels. Those at the right and bottom borders are smaller.
     pub fn shard_side(&self) -> u32 {
-        self.shard_side
+        self.grids.shard_side
+    }
+
+    /// Shards along a row and down a column of a level.
+    pub fn shard_grid(&self, level: u32) -> Extent {
+        self.grids.shard_grid(level)
     }
 
     /// Camera pixels of a level, 0 to [`levels`](Self::levels) - 1.
     pub fn camera(&self, level: u32) -> Extent {
-        level_extent(self.camera, level)
+        level_extent(self.grids.camera, level)
     }
 
     /// Light elements of a level, 0 to [`levels`](Self::levels) - 1.
     pub fn light(&self, level: u32) -> Extent {
-        level_extent(self.light, level)
+        level_extent(self.grids.light, level)
     }
 
     /// All shards but the root, in file order.
@@ -212,14 +205,12 @@ impl LevelTable {
     /// If the level has no such shard.
     pub fn rect(&self, shard: ShardId) -> TileRect {
         let camera = self.camera(shard.level);
-        let [x, y] = [shard.x, shard.y].map(|at| at * self.shard_side);
+        let side = self.shard_side();
+        let [x, y] = [shard.x, shard.y].map(|at| at * side);
         TileRect {
             x,
             y,
-            extent: Extent::new(
-                self.shard_side.min(camera.width - x),
-                self.shard_side.min(camera.height - y),
-            ),
+            extent: Extent::new(side.min(camera.width - x), side.min(camera.height - y)),
         }
     }
 
@@ -241,6 +232,7 @@ impl LevelTable {
 }
 
 /// The grids of a table, checked.
+#[derive(Clone, Debug, PartialEq, Eq)]
 struct Grids {
     camera: Extent,
     light: Extent,

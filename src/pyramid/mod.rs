@@ -20,4 +20,4 @@ mod writer;
 
 pub use reader::{PyramidReader, Shard};
 pub use spool::Spool;
-pub use writer::{PyramidLayout, SHARD_SIDE, level_count, write_pyramid};
+pub use writer::{PyramidLayout, SHARD_SIDE, least_level_count, level_count, write_pyramid};

@@ -26,25 +26,6 @@ pub const SHARD_SIDE: u32 = 1024;
 /// Number of tiles that are made at a time.
 const BATCH_TILES: usize = 64;
 
-/// What a file of several levels is made of.
-struct PyramidSource<'a> {
-    /// The geometry of level 0.
-    geometry: Geometry,
-    /// Makes a shard of level 0.
-    shard: &'a ShardMaker<'a>,
-    /// Quantisation step of the other levels; `None` for lossless files.
-    step: Option<f32>,
-    /// Metadata of the file.
-    metadata: MetadataText,
-    /// Extensions of the file, which readers may ignore.
-    extensions: Vec<FormatExtension>,
-}
-
-/// Makes a shard of level 0 with this geometry, extensions and metadata.
-type ShardMaker<'a> = dyn Fn(Geometry, Vec<FormatExtension>, MetadataText) -> Result<EncodedFile, FormatError>
-    + Sync
-    + 'a;
-
 /// How many levels a file has, and how they are cut.
 #[derive(Clone, Copy, Debug)]
 pub struct PyramidLayout {
@@ -56,13 +37,20 @@ pub struct PyramidLayout {
 
 /// Number of levels that a picture of `camera` pixels should have.
 pub fn level_count(camera: Extent) -> u32 {
-    let side = camera.width.max(camera.height);
-    if side <= MAX_SINGLE_SIDE {
-        return 1;
+    match camera.width.max(camera.height) <= MAX_SINGLE_SIDE {
+        true => 1,
+        false => least_level_count(camera, MAX_ROOT_SIDE),
     }
-    // The smallest number of halvings, rounded up, after which the side is small enough.
-    1 + side.div_ceil(MAX_ROOT_SIDE).next_power_of_two().ilog2()
 }
+
+/// The smallest number of levels of which the last has sides of at most `max_side` pixels.
+pub fn least_level_count(camera: Extent, max_side: u32) -> u32 {
+    let side = camera.width.max(camera.height);
+    1 + side.div_ceil(max_side).next_power_of_two().ilog2()
+}
+
+/// Gives the bytes of a chunk.
+type FetchChunk<'a> = dyn Fn(ChunkId) -> Result<Vec<u8>, FormatError> + Sync + 'a;
 
 /// Writes a file of one level, whose index is `index`, as one of several. `fetch` gives the bytes of its chunks, which are
 /// copied; `spools` are two temporary files.
@@ -75,7 +63,7 @@ pub fn level_count(camera: Extent) -> u32 {
 /// errors of `fetch` and of [`EncodedFile`].
 pub fn write_pyramid<F: Read + Write + Seek + Send>(
     index: &FileIndex,
-    fetch: &(dyn Fn(ChunkId) -> Result<Vec<u8>, FormatError> + Sync),
+    fetch: &FetchChunk<'_>,
     layout: PyramidLayout,
     spools: [Spool<F>; 2],
     executor: &impl Executor,
@@ -89,24 +77,12 @@ pub fn write_pyramid<F: Read + Write + Seek + Send>(
         let error = io::Error::new(ErrorKind::InvalidInput, reason);
         return Err(FormatError::Source(error));
     }
-    let copy = |shard: Geometry, extensions, metadata| {
-        if executor.is_cancelled() {
-            return Err(FormatError::Source(ErrorKind::Interrupted.into()));
-        }
-        let tiles = tiles_of_shard(geometry, &shard);
-        EncodedFile::copy_of(index, shard, &tiles, extensions, metadata, fetch)
-    };
     let [shards, tiles] = spools;
-    let source = PyramidSource {
-        geometry: geometry.clone(),
-        shard: &copy,
-        step: index.quantisation_step(),
-        metadata: index.metadata.clone(),
-        extensions: index.extensions.clone(),
-    };
     let writer = PyramidWriter {
-        shard_metadata: shard_metadata(&source.metadata)?,
-        source: &source,
+        index,
+        fetch,
+        step: index.quantisation_step(),
+        shard_metadata: shard_metadata(&index.metadata)?,
         table,
         shards,
         tiles,
@@ -144,7 +120,11 @@ fn shard_metadata(metadata: &MetadataText) -> Result<Metadata, FormatError> {
 }
 
 struct PyramidWriter<'a, F, E> {
-    source: &'a PyramidSource<'a>,
+    /// Of the file of one level.
+    index: &'a FileIndex,
+    fetch: &'a FetchChunk<'a>,
+    /// Quantisation step of all levels; `None` for lossless files.
+    step: Option<f32>,
     shard_metadata: Metadata,
     table: LevelTable,
     /// Files of shards.
@@ -208,10 +188,16 @@ impl<F: Read + Write + Seek + Send, E: Executor> PyramidWriter<'_, F, E> {
         }
     }
 
+    /// Level 0, whose shards are copies.
     fn finest_level(&self) -> Result<SpooledLevel, FormatError> {
-        self.shards(0, self.source.geometry.clone(), |shard, extensions| {
+        let whole = &self.index.header.geometry;
+        self.shards(0, whole.clone(), |shard, extensions| {
+            if self.executor.is_cancelled() {
+                return Err(FormatError::Source(ErrorKind::Interrupted.into()));
+            }
             let metadata = MetadataText::encode(&self.shard_metadata)?;
-            (self.source.shard)(shard, extensions, metadata)
+            let tiles = tiles_of_shard(whole, &shard);
+            EncodedFile::copy_of(self.index, shard, &tiles, extensions, metadata, self.fetch)
         })
     }
 
@@ -238,9 +224,9 @@ impl<F: Read + Write + Seek + Send, E: Executor> PyramidWriter<'_, F, E> {
             coarse: &coarse,
         };
         let root = self.coarse_shard(&levels, fine, &coarse, Vec::new())?;
-        let mut extensions = self.source.extensions.clone();
+        let mut extensions = self.index.extensions.clone();
         extensions.push(self.table.extension());
-        root.with_extensions(extensions, self.source.metadata.clone())
+        root.with_extensions(extensions, self.index.metadata.clone())
     }
 
     /// Makes all shards of a level: `make` gets the geometry and the extensions of each.
@@ -250,9 +236,7 @@ impl<F: Read + Write + Seek + Send, E: Executor> PyramidWriter<'_, F, E> {
         geometry: Geometry,
         make: impl Fn(Geometry, Vec<FormatExtension>) -> Result<EncodedFile, FormatError>,
     ) -> Result<SpooledLevel, FormatError> {
-        let side = self.table.shard_side();
-        let Extent { width, height } = geometry.camera;
-        let grid = Extent::new(width.div_ceil(side), height.div_ceil(side));
+        let grid = self.table.shard_grid(number);
         let mut shards = Vec::with_capacity(grid.area());
         for (x, y) in grid.cells() {
             let id = ShardId {
@@ -336,7 +320,7 @@ impl<F: Read + Write + Seek + Send, E: Executor> PyramidWriter<'_, F, E> {
             metadata: self.shard_metadata.clone(),
             extensions,
         };
-        match self.source.step {
+        match self.step {
             Some(step) => EncodedFile::with_step(input, step, self.executor),
             None => EncodedFile::new(input, EncodingTarget::Lossless, self.executor),
         }

@@ -78,12 +78,9 @@ impl<'a> Level<'a> {
         let table = self.reader.table();
         let plane = table.light(number);
         // Unlike a shard, it is in memory as a whole.
-        let fits = |level: u32| {
-            let Extent { width, height } = table.light(level);
-            u64::from(width) * u64::from(height) * LIGHT_ELEMENT_BYTES <= LIMITS.decoded_bytes
-        };
+        let elements = u64::from(plane.width) * u64::from(plane.height);
         ensure!(
-            fits(number),
+            elements * LIGHT_ELEMENT_BYTES <= LIMITS.decoded_bytes,
             "{}: level {} has {plane} light elements, which do not fit in memory; give a larger --level",
             args.file.display(),
             number

@@ -73,11 +73,7 @@ pub fn run(args: &TilesArgs) -> Result<()> {
         tiles = write(args, folder)?;
         Ok(())
     });
-    // An error of the file names it; the folder is no cause.
-    written.map_err(|error| match error.downcast() {
-        Ok(InputError(cause)) => cause,
-        Err(error) => error,
-    })?;
+    written.map_err(InputError::without_output)?;
     print_line(&format!("{}: {tiles} tiles", args.output.display()))
 }
 
