@@ -22,8 +22,8 @@ use relightable_photo::format::{
 };
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::pyramid::PyramidReader;
+use relightable_photo::relight::BuiltinLight;
 use relightable_photo::relight::cpu::CpuRelighter;
-use relightable_photo::relight::{BuiltinLight, Light};
 use relightable_photo::transport::{CHANNELS, Extent, Geometry, TileRect};
 
 use figures::Figures;
@@ -112,7 +112,7 @@ impl Levels {
     /// The linear picture of a level under a light.
     fn picture(&self, level: u32, light: BuiltinLight) -> Vec<[f64; CHANNELS]> {
         let table = self.reader.table();
-        let (camera, light) = (table.camera(level), light.render(table.light(level)));
+        let camera = table.camera(level);
         let whole = TileRect {
             x: 0,
             y: 0,
@@ -122,12 +122,7 @@ impl Levels {
         for id in self.reader.shards_in(level, whole) {
             let fetch = |range| Ok::<_, FormatError>(read_range(&self.file, range));
             let shard = self.reader.shard(id, whole, fetch).unwrap();
-            let Geometry {
-                light: plane,
-                correspondence,
-                ..
-            } = &shard.transport.geometry;
-            let light: Light = light.crop(correspondence.origin.light, *plane);
+            let light = light.render(shard.transport.geometry.light_region());
             let mut relighter = CpuRelighter::new(Arc::new(shard.transport));
             relighter.relight(&light, &SequentialExecutor);
             for (pixel, value) in shard.rect.pixels().zip(&relighter.linear().pixels) {

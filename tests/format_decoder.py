@@ -137,9 +137,12 @@ class FileIndex:
             else:
                 require(not flags & 1, f"an extension that must be understood: {tag}")
         place = known.get(b"SHRD")
-        require(place is None or len(place) == 20, "the place of a shard")
-        self.place = place and unpack_from("<5I", place)
-        _, self.first_x, self.first_y, self.first_u, self.first_v = self.place or [0] * 5
+        require(place is None or len(place) == 28, "the place of a shard")
+        self.place = place and unpack_from("<7I", place)
+        _, self.first_x, self.first_y, self.first_u, self.first_v, *plane = self.place or [0] * 7
+        own = (self.first_u + self.light_width, self.first_v + self.light_height)
+        is_within = not place or all(end <= side for end, side in zip(own, plane))
+        require(is_within, "the light plane of a shard")
         self.table = known.get(b"LEVL")
         self.displacement = None
         if b"DISP" in known:
@@ -252,8 +255,7 @@ def split_levels(file):  # section 12
         require(index.place and index.place[:3] == (level, x, y), "a shard at another place")
         size = min(shard_side, width - x), min(shard_side, height - y)
         require((index.width, index.height) == size, "a shard of another size")
-        require(index.first_u + index.light_width <= light_width, "the light plane of a shard")
-        require(index.first_v + index.light_height <= light_height, "the light plane of a shard")
+        require(index.place[5:] == (light_width, light_height), "the light plane of a level")
         parts.append((index, part))
     require(at == len(file), "shards whose lengths do not add up")
     return parts

@@ -16,7 +16,8 @@ use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::pyramid::{PyramidLayout, PyramidReader, Spool, write_pyramid};
 use relightable_photo::relight::{Light, reference};
 use relightable_photo::transport::{
-    Basis, CHANNELS, CameraPixel, Decibels, DisplacementGrid, Extent, FloatTile, Geometry, TileRect,
+    Basis, CHANNELS, CameraPixel, Decibels, DisplacementGrid, Extent, FloatTile, Geometry,
+    LightPosition, LightRegion, TileRect,
 };
 
 const TILE: u32 = 16;
@@ -122,18 +123,26 @@ fn relit(file: &[u8], level: u32, light: &Light) -> Vec<[f64; CHANNELS]> {
     for id in reader.shards_in(level, whole) {
         let fetch = |range| Ok::<_, FormatError>(bytes_at(file, range));
         let shard = reader.shard(id, whole, fetch).unwrap();
-        let Geometry {
-            light: plane,
-            correspondence,
-            ..
-        } = &shard.transport.geometry;
-        let light = light.crop(correspondence.origin.light, *plane);
+        let light = cropped(light, shard.transport.geometry.light_region());
         let pixels = reference::relight(&shard.transport, &light);
         for (pixel, value) in shard.rect.pixels().zip(pixels) {
             picture[camera.index(pixel)] = value;
         }
     }
     picture
+}
+
+/// The elements of a region.
+fn cropped(light: &Light, region: LightRegion) -> Light {
+    assert_eq!(light.extent(), region.plane);
+    let values: Vec<f32> = region
+        .centres()
+        .flat_map(|LightPosition { u, v }| {
+            let element = light.elements()[v as usize * region.plane.width as usize + u as usize];
+            [element[0], element[1], element[2]]
+        })
+        .collect();
+    Light::from_linear_rgb(region.extent, &values).unwrap()
 }
 
 /// Each pixel's mean over the pixels that it stands for.

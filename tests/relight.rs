@@ -10,8 +10,10 @@ use common::{bent, tiled};
 use proptest::prelude::*;
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::cpu::CpuRelighter;
-use relightable_photo::relight::{Light, OutputTransform, TorchSpot, reference};
-use relightable_photo::transport::{Geometry, LightPosition, MAX_WINDOW, Tile};
+use relightable_photo::relight::{BuiltinLight, Light, OutputTransform, TorchSpot, reference};
+use relightable_photo::transport::{
+    Extent, Geometry, LightPosition, LightRegion, MAX_WINDOW, Tile,
+};
 
 /// Grids, windows and tiles of all shapes, with correspondences that rotate, mirror and shift the picture until windows
 /// hang over the light plane's edges, or miss it, and bend.
@@ -32,6 +34,61 @@ fn geometries() -> impl Strategy<Value = Geometry> {
             let geometry = tiled(camera, light, window, tile_side, [u, v]);
             if bends { bent(geometry) } else { geometry }
         })
+}
+
+/// Shards side by side must be under one light.
+#[test]
+fn a_light_on_a_part_of_a_light_plane_is_that_part_of_the_light() {
+    let plane = Extent::new(250, 130);
+    let image = Extent::new(90, 201);
+    let values: Vec<f32> = (0..3 * image.area())
+        .map(|i| (i * 31 % 97) as f32)
+        .collect();
+    let codes: Vec<u8> = (0..4 * image.area())
+        .map(|i| (i * 89 % 256) as u8)
+        .collect();
+    let spot = TorchSpot {
+        centre: LightPosition { u: 70.3, v: -4.0 },
+        radius: 20.0,
+    };
+    let make = |region: LightRegion| {
+        let mut lights = BuiltinLight::BY_NAME
+            .map(|(_, light)| light.render(region))
+            .to_vec();
+        lights.push(Light::torch(region, spot));
+        lights.push(Light::fire(region, 12.5));
+        let linear = Light::from_linear_rows(region, image, |y, row| {
+            row.copy_from_slice(&values[y * row.len()..][..row.len()]);
+        });
+        lights.push(linear.unwrap());
+        let srgb = Light::from_srgb_rows(region, image, |y, row| {
+            row.copy_from_slice(&codes[y * row.len()..][..row.len()]);
+        });
+        lights.push(srgb.unwrap());
+        lights
+    };
+    let whole = make(plane.into());
+    for (first, extent) in [
+        ([0, 0], Extent::new(250, 130)),
+        ([17, 33], Extent::new(64, 70)),
+        ([249, 129], Extent::new(1, 1)),
+        ([101, 0], Extent::new(149, 2)),
+    ] {
+        let region = LightRegion {
+            plane,
+            first,
+            extent,
+        };
+        for (part, whole) in make(region).iter().zip(&whole) {
+            assert_eq!(part.extent(), extent);
+            let columns = |v: u32| {
+                let start = (v * plane.width + first[0]) as usize;
+                &whole.elements()[start..start + extent.width as usize]
+            };
+            let cropped: Vec<_> = region.rows().flat_map(columns).copied().collect();
+            assert_eq!(part.elements(), cropped);
+        }
+    }
 }
 
 proptest! {

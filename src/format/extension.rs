@@ -9,12 +9,14 @@ use super::memory_budget::MemoryBudget;
 const RECORD_HEADER_BYTES: usize = 12;
 /// The flag of an extension that a reader must know to read the file.
 const MUST_UNDERSTAND: u32 = 1;
-/// The extensions that this reader knows. In browsers there are no levels yet.
+/// The name of the extension with the table of levels.
+pub(super) const TABLE_TAG: [u8; 4] = *b"LEVL";
+/// The extensions that this reader knows.
 const UNDERSTOOD: &[[u8; 4]] = &[
     displacement::TAG,
-    #[cfg(not(target_arch = "wasm32"))]
-    super::levels::TABLE_TAG,
-    #[cfg(not(target_arch = "wasm32"))]
+    #[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
+    TABLE_TAG,
+    #[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
     super::levels::PLACE_TAG,
 ];
 

@@ -14,18 +14,17 @@
 //! SHRD   u32 level
 //!        u32 camera column, row        of the shard's first pixel, in the level
 //!        u32 light column, row         of the shard's first light element, in the level
+//!        u32 light width, height       of the level, in elements
 //! ```
 
 use std::ops::Range;
 
 use super::error::{FormatError, SectionError, SectionName, damaged};
-use super::extension::FormatExtension;
+use super::extension::{FormatExtension, TABLE_TAG};
 use super::fields::FieldReader;
 use super::index::FileIndex;
 use crate::transport::{Extent, ShardOrigin, TileRect};
 
-/// The name of the extension with the table.
-pub(super) const TABLE_TAG: [u8; 4] = *b"LEVL";
 /// The name of the extension with the place of a shard.
 pub(super) const PLACE_TAG: [u8; 4] = *b"SHRD";
 /// Bytes of the table before the lengths.
@@ -86,10 +85,9 @@ impl LevelTable {
         let count = grids.shards;
         let mut shards = Vec::with_capacity(count);
         for level in (0..grids.levels - 1).rev() {
-            let first = shards.len();
-            let cells = grids.shard_grid(level).cells();
-            shards.extend(cells.map(|(x, y)| ShardId { level, x, y }));
-            shards[first..].sort_unstable_by_key(order);
+            let grid = grids.shard_grid(level);
+            let side = grid.width.max(grid.height).next_power_of_two();
+            add_quarters(&mut shards, ShardId { level, x: 0, y: 0 }, side, grid);
         }
         Self {
             grids,
@@ -294,8 +292,7 @@ pub struct ShardPlace {
 impl ShardPlace {
     /// The extension of a shard, which readers must understand: it moves windows.
     pub fn extension(&self) -> FormatExtension {
-        let ShardOrigin { camera, light } = self.origin;
-        let fields = [[self.level].as_slice(), &camera, &light].concat();
+        let fields = [[self.level].as_slice(), &self.origin.to_numbers()].concat();
         FormatExtension {
             tag: PLACE_TAG,
             must_understand: true,
@@ -303,27 +300,35 @@ impl ShardPlace {
         }
     }
 
-    /// The place of the shard with these extensions, if it is one.
+    /// The place of the shard with these extensions and a light plane of `light`, if it is one.
     ///
     /// # Errors
     /// If the extension breaks a rule, or there are two.
-    pub(super) fn decode(extensions: &[FormatExtension]) -> Result<Option<Self>, SectionError> {
+    pub(super) fn decode(
+        extensions: &[FormatExtension],
+        light: Extent,
+    ) -> Result<Option<Self>, SectionError> {
         let mut places = extensions.iter().filter(|e| e.tag == PLACE_TAG);
         let Some(extension) = places.next() else {
             return Ok(None);
         };
+        let invalid = || damaged("the place of the shard is invalid");
         let (fields, rest) = extension.data.as_chunks();
-        let (&[level, x, y, u, v], true, None) = (fields, rest.is_empty(), places.next()) else {
-            return Err(damaged("the place of the shard is invalid"));
+        let (&[level, ref numbers @ ..], true, None) = (fields, rest.is_empty(), places.next())
+        else {
+            return Err(invalid());
         };
-        let [x, y, u, v] = [x, y, u, v].map(u32::from_le_bytes);
-        Ok(Some(Self {
-            level: u32::from_le_bytes(level),
-            origin: ShardOrigin {
-                camera: [x, y],
-                light: [u, v],
-            },
-        }))
+        let numbers = <[[u8; 4]; 6]>::try_from(numbers).map_err(|_| invalid())?;
+        let origin = ShardOrigin::from_numbers(numbers.map(u32::from_le_bytes));
+        match origin.is_valid(light) {
+            true => Ok(Some(Self {
+                level: u32::from_le_bytes(level),
+                origin,
+            })),
+            false => Err(damaged(
+                "the light plane of the shard is not within that of its level",
+            )),
+        }
     }
 
     /// Checks that a file is the shard of `table` with this name.
@@ -337,19 +342,13 @@ impl ShardPlace {
         let light = table.light(shard.level);
         let geometry = &index.header.geometry;
         let agrees = |place: &Self| {
-            let [x, y] = place.origin.light;
-            let own_light = TileRect {
-                x,
-                y,
-                extent: geometry.light,
-            };
             place.level == shard.level
                 && index.header.file_bytes == bytes
                 && place.origin.camera == [rect.x, rect.y]
+                && place.origin.plane == [light.width, light.height]
                 && geometry.camera == rect.extent
-                && own_light.is_within(light)
         };
-        let place = Self::decode(&index.extensions);
+        let place = Self::decode(&index.extensions, geometry.light);
         let place = place.and_then(|place| {
             place
                 .filter(agrees)
@@ -364,8 +363,7 @@ impl ShardPlace {
 impl FileIndex {
     /// Whether the file is a shard of a larger picture.
     pub fn is_shard(&self) -> bool {
-        let mut tags = self.extensions.iter().map(|extension| extension.tag);
-        tags.any(|tag| tag == PLACE_TAG)
+        self.has_extension(PLACE_TAG)
     }
 }
 
@@ -373,6 +371,26 @@ impl FileIndex {
 fn level_extent(Extent { width, height }: Extent, level: u32) -> Extent {
     let side = |side: u32| side.div_ceil(1 << level);
     Extent::new(side(width), side(height))
+}
+
+/// Adds the shards of a square of `side` from `first` on that are on the grid, along a Morton curve: quarter by quarter.
+fn add_quarters(shards: &mut Vec<ShardId>, first: ShardId, side: u32, grid: Extent) {
+    if first.x >= grid.width || first.y >= grid.height {
+        return;
+    }
+    if side == 1 {
+        shards.push(first);
+        return;
+    }
+    let half = side / 2;
+    for (x, y) in [(0, 0), (half, 0), (0, half), (half, half)] {
+        let quarter = ShardId {
+            x: first.x + x,
+            y: first.y + y,
+            ..first
+        };
+        add_quarters(shards, quarter, half, grid);
+    }
 }
 
 /// A shard's place on the Morton curve: bits of column and row alternate.

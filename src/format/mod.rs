@@ -26,7 +26,7 @@ mod extension;
 mod fields;
 mod header;
 mod index;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
 mod levels;
 mod memory_budget;
 mod memory_estimate;
@@ -44,7 +44,7 @@ pub use error::{FormatError, SectionName, TextModeDamage};
 pub use extension::FormatExtension;
 pub use header::Header;
 pub use index::FileIndex;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
 pub use levels::{LevelTable, ShardId, ShardPlace};
 pub use memory_budget::Limits;
 pub use metadata::{CaptureMetadata, Metadata, MetadataText};

@@ -104,6 +104,7 @@ pub fn shard(geometry: &Geometry, rect: TileRect) -> Geometry {
     let origin = ShardOrigin {
         camera: [rect.x, rect.y],
         light: start.map(|at| at as u32),
+        plane: [geometry.light.width, geometry.light.height],
     };
     let displacement = displacement.as_ref();
     Geometry {

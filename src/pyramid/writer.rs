@@ -21,8 +21,8 @@ use crate::transport::{Basis, Extent, FloatTile, Geometry, TileRect};
 const MAX_SINGLE_SIDE: u32 = 1024;
 /// Maximum side of the root: a first picture comes as fast as that of a small file.
 const MAX_ROOT_SIDE: u32 = 512;
-/// Usual side of shards: one fills most of a screen, and the index of a gigapixel has few.
-pub const SHARD_SIDE: u32 = 1024;
+/// Usual side of shards: a screen shows a dozen, most of them whole, and the index of a gigapixel has few thousand.
+pub const SHARD_SIDE: u32 = 512;
 /// Number of tiles that are made at a time.
 const BATCH_TILES: usize = 64;
 

@@ -5,8 +5,10 @@
 //! added on top. Everything is a function of time, through hashes of lattice points, so a fire can be drawn at any
 //! moment. Lengths are in heights of the light plane, `y` upwards.
 
+use std::ops::Range;
+
 use super::platform_math;
-use crate::transport::Extent;
+use crate::transport::LightRegion;
 
 /// Rows at which heat is computed, at most; it is interpolated between them.
 const MAX_HEAT_ROWS: u32 = 112;
@@ -15,18 +17,21 @@ const START_SECONDS: f64 = 500.4;
 /// Sparks in the air over a square light plane.
 const SPARK_COUNT: f64 = 14.0;
 
-/// Linear emission of every light element, row by row, at a time in seconds. A time that is not finite counts as 0.
-pub(super) fn fire_emission(extent: Extent, seconds: f64) -> Vec<[f32; 4]> {
+/// Linear emission of every light element of a region, row by row, at a time in seconds. A time that is not finite counts
+/// as 0.
+pub(super) fn fire_emission(region: LightRegion, seconds: f64) -> Vec<[f32; 4]> {
     let seconds = START_SECONDS + if seconds.is_finite() { seconds } else { 0.0 };
     let noise = FlameNoise::at(seconds);
-    let size = extent.height as f32;
+    let plane = region.plane;
+    let size = plane.height as f32;
     // Heat is computed at the centres of every `pitch`th element; the last nodes may lie beyond the edge.
-    let pitch = extent.height.div_ceil(MAX_HEAT_ROWS).max(1);
-    let nodes = |length: u32| (0..=length.saturating_sub(1).div_ceil(pitch)).map(|i| i * pitch);
-    let columns: Vec<(f32, FlameColumn)> = nodes(extent.width)
-        .map(|u| {
-            let x = (u as f32 + 0.5) / size;
-            (x, FlameColumn::at(&noise, x, extent.width as f32 / size))
+    let pitch = plane.height.div_ceil(MAX_HEAT_ROWS).max(1);
+    let first_node = region.first[0] / pitch;
+    let last_node = (region.columns().end - 1).div_ceil(pitch);
+    let columns: Vec<(f32, FlameColumn)> = (first_node..=last_node)
+        .map(|i| {
+            let x = ((i * pitch) as f32 + 0.5) / size;
+            (x, FlameColumn::at(&noise, x, plane.width as f32 / size))
         })
         .collect();
     let row = |v: u32| -> Vec<f32> {
@@ -34,25 +39,29 @@ pub(super) fn fire_emission(extent: Extent, seconds: f64) -> Vec<[f32; 4]> {
         let heat = |(x, column): &(f32, FlameColumn)| noise.heat(*x, y, column);
         columns.iter().map(heat).collect()
     };
-    let mut elements = Vec::with_capacity(extent.area());
+    let mut elements = Vec::with_capacity(region.extent.area());
     let mut nodes = vec![0.0; columns.len()];
-    let (mut above, mut below) = (row(0), row(pitch));
-    for v in 0..extent.height {
-        if v > 0 && v % pitch == 0 {
+    let first = region.first[1] / pitch * pitch;
+    let (mut above, mut below) = (row(first), row(first + pitch));
+    for v in region.rows() {
+        if v > region.first[1] && v % pitch == 0 {
             above = std::mem::replace(&mut below, row(v + pitch));
         }
         let t = (v % pitch) as f32 / pitch as f32;
         for ((node, above), below) in nodes.iter_mut().zip(&above).zip(&below) {
             *node = above + (below - above) * t;
         }
-        for u in 0..extent.width {
-            let (i, part) = ((u / pitch) as usize, (u % pitch) as f32 / pitch as f32);
+        for u in region.columns() {
+            let (i, part) = (
+                (u / pitch - first_node) as usize,
+                (u % pitch) as f32 / pitch as f32,
+            );
             let left = nodes[i];
             let right = nodes.get(i + 1).copied().unwrap_or(left);
             elements.push(heat_colour(left + (right - left) * part));
         }
     }
-    add_sparks(extent, seconds, &mut elements);
+    add_sparks(region, seconds, &mut elements);
     elements
 }
 
@@ -65,9 +74,9 @@ fn heat_colour(heat: f32) -> [f32; 4] {
 }
 
 /// Adds the sparks: Gaussian spots that rise, sway and fade.
-fn add_sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
-    let size = f64::from(extent.height);
-    let width = f64::from(extent.width);
+fn add_sparks(region: LightRegion, seconds: f64, elements: &mut [[f32; 4]]) {
+    let size = f64::from(region.plane.height);
+    let width = f64::from(region.plane.width);
     // Smaller spots would flicker as they pass from element to element.
     let radius = (0.0055 * size).max(0.7);
     let count = (SPARK_COUNT * width / size).clamp(1.0, 64.0) as u32;
@@ -83,15 +92,18 @@ fn add_sparks(extent: Extent, seconds: f64, elements: &mut [[f32; 4]]) {
         let v = size * (0.92 - (0.35 + 0.55 * unit(n, 95)) * age);
         // It lights up quickly and fades.
         let power = (8.0 * age).min(1.0) * (1.0 - age).powi(2) * (0.4 + 0.5 * unit(n, 96));
-        let reach = |centre: f64, length: u32| {
+        let reach = |centre: f64, part: Range<u32>| {
             let first = (centre - 3.0 * radius).max(0.0) as u32;
-            first..((centre + 3.0 * radius).max(0.0) as u32).min(length)
+            let end = (centre + 3.0 * radius).max(0.0) as u32;
+            first.max(part.start)..end.min(part.end)
         };
-        for j in reach(v, extent.height) {
-            for i in reach(u, extent.width) {
+        for j in reach(v, region.rows()) {
+            for i in reach(u, region.columns()) {
                 let (du, dv) = (f64::from(i) + 0.5 - u, f64::from(j) + 0.5 - v);
                 let spot = (power * (-(du * du + dv * dv) / (2.0 * radius * radius)).exp()) as f32;
-                let element = &mut elements[j as usize * extent.width as usize + i as usize];
+                let [column, row] = [i - region.first[0], j - region.first[1]];
+                let element =
+                    &mut elements[row as usize * region.extent.width as usize + column as usize];
                 for (value, colour) in element.iter_mut().zip([1.0, 0.42, 0.08, 0.0]) {
                     *value += colour * spot * (1.0 - *value);
                 }
@@ -231,12 +243,13 @@ fn hash(i: u32, j: u32, seed: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transport::Extent;
 
     const FRAME: f64 = 1.0 / 60.0;
 
     fn emission_at(seconds: f64) -> Vec<[f32; 4]> {
         let side = 64;
-        fire_emission(Extent::new(side, side), seconds)
+        fire_emission(Extent::new(side, side).into(), seconds)
     }
 
     fn mean_change(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
@@ -285,12 +298,12 @@ mod tests {
         for [width, height] in [[1, 1], [3, 200], [200, 3], [1, 256], [129, 130], [2, 257]] {
             for seconds in [0.0, -7.25, 1e9, 1e300, f64::NAN, f64::INFINITY] {
                 let extent = Extent { width, height };
-                let elements = fire_emission(extent, seconds);
+                let elements = fire_emission(extent.into(), seconds);
                 assert_eq!(elements.len(), extent.area());
                 for value in elements.as_flattened() {
                     assert!((0.0..=1.0).contains(value), "{value} on {extent}");
                 }
-                assert_eq!(fire_emission(extent, seconds), elements);
+                assert_eq!(fire_emission(extent.into(), seconds), elements);
             }
         }
     }
@@ -299,7 +312,7 @@ mod tests {
     fn a_finer_light_plane_shows_the_same_fire() {
         let [coarse, fine] = [60, 240].map(|side| {
             let extent = Extent::new(side, side);
-            fire_emission(extent, 3.0)
+            fire_emission(extent.into(), 3.0)
         });
         for v in 0..60 {
             for u in 0..60 {

@@ -1,11 +1,13 @@
 //! Lights: the vector `p` in `y = pT`, one linear RGB emission for each element of the light plane.
 
+use std::ops::Range;
+
 use thiserror::Error;
 
 use super::resample::AreaResampler;
-use super::{fire, platform_math};
+use super::{fire, platform_math, srgb};
 use crate::transport::{
-    ColorMatrix, Extent, Geometry, LightPosition, convert_color, single_precision,
+    ColorMatrix, Extent, Geometry, LightPosition, LightRegion, convert_color, single_precision,
 };
 
 /// The linear emission of every light element, 0 to 1 at full brightness.
@@ -86,26 +88,30 @@ impl BuiltinLight {
         lights.find_map(|(known, light)| (known == name).then_some(light))
     }
 
-    /// The light on a light plane of that extent.
-    pub fn render(self, extent: Extent) -> Light {
-        let (w, h) = (f64::from(extent.width), f64::from(extent.height));
+    /// The light on a light plane, or on a part of one.
+    pub fn render(self, region: impl Into<LightRegion>) -> Light {
+        let region = region.into();
+        let plane = region.plane;
+        let (w, h) = (f64::from(plane.width), f64::from(plane.height));
         let white = |on: bool| if on { [1.0; 3] } else { [0.0; 3] };
         match self {
-            Self::Flood => Light::from_fn(extent, |_| [1.0; 3]),
-            Self::Torch => Light::torch(extent, TorchSpot::central(extent)),
+            Self::Flood => Light::from_fn(region, &|_| [1.0; 3]),
+            Self::Torch => Light::torch(region, TorchSpot::central(plane)),
             Self::Checkerboard => {
                 let cell = (w.min(h) / 8.0).max(1.0);
-                Light::from_fn(extent, |p| {
+                Light::from_fn(region, &|p| {
                     let (i, j) = ((p.u / cell) as u32, (p.v / cell) as u32);
                     white((i + j).is_multiple_of(2))
                 })
             }
             Self::Stripes => {
                 let stripe = (w / 16.0).max(1.0);
-                Light::from_fn(extent, |p| white(((p.u / stripe) as u32).is_multiple_of(2)))
+                Light::from_fn(region, &|p| {
+                    white(((p.u / stripe) as u32).is_multiple_of(2))
+                })
             }
-            Self::Spectrum => Light::from_fn(extent, |p| rainbow(p.u / w)),
-            Self::Fire => Light::fire(extent, 0.0),
+            Self::Spectrum => Light::from_fn(region, &|p| rainbow(p.u / w)),
+            Self::Fire => Light::fire(region, 0.0),
         }
     }
 }
@@ -149,13 +155,17 @@ pub enum LightError {
 
 impl Light {
     /// A light from the emission at each element's centre, which must be finite and not negative.
-    fn from_fn(extent: Extent, emission: impl Fn(LightPosition) -> [f32; 3]) -> Self {
-        let mut elements = Vec::with_capacity(extent.area());
-        for (u, v) in extent.cells() {
-            let [u, v] = [u, v].map(|at| f64::from(at) + 0.5);
-            elements.push(element(emission(LightPosition { u, v })));
+    ///
+    /// Not generic: modules have one copy of it.
+    fn from_fn(region: LightRegion, emission: &dyn Fn(LightPosition) -> [f32; 3]) -> Self {
+        let mut elements = Vec::with_capacity(region.extent.area());
+        for centre in region.centres() {
+            elements.push(element(emission(centre)));
         }
-        Self { extent, elements }
+        Self {
+            extent: region.extent,
+            elements,
+        }
     }
 
     /// A light from linear RGB values, `[height, width, 3]`.
@@ -176,15 +186,47 @@ impl Light {
         })
     }
 
-    /// A light from a light image of any extent, resampled by area. `read_row` fills each row in turn with linear RGB
-    /// values.
+    /// A light from a light image of any extent, which covers the light plane, resampled by area. `read_row` fills rows
+    /// in turn with linear RGB values: those that the light needs.
     ///
     /// # Errors
     /// [`LightError::EmptyImage`] or [`LightError::InvalidValue`].
     pub fn from_linear_rows(
-        extent: Extent,
+        region: impl Into<LightRegion>,
         image: Extent,
         mut read_row: impl FnMut(usize, &mut [f32]),
+    ) -> Result<Self, LightError> {
+        Self::from_rows(region.into(), image, &mut read_row)
+    }
+
+    /// As [`from_linear_rows`](Self::from_linear_rows), from rows of sRGB codes and straight alpha; a pixel emits its
+    /// alpha's share of its colour. Codes are decoded before they are averaged, as the mean of codes is darker than that
+    /// of light.
+    ///
+    /// # Errors
+    /// [`LightError::EmptyImage`].
+    pub fn from_srgb_rows(
+        region: impl Into<LightRegion>,
+        image: Extent,
+        mut read_row: impl FnMut(usize, &mut [u8]),
+    ) -> Result<Self, LightError> {
+        let linear = srgb::srgb8_decoded();
+        let mut codes = vec![0; 4 * image.width as usize];
+        Self::from_rows(region.into(), image, &mut |y, row| {
+            read_row(y, &mut codes);
+            let (pixels, codes) = (row.as_chunks_mut().0, codes.as_chunks().0);
+            for (emission, &[r, g, b, alpha]) in pixels.iter_mut().zip(codes) {
+                let alpha = f64::from(alpha) * (1.0 / 255.0);
+                *emission = [r, g, b].map(|code: u8| (alpha * linear[usize::from(code)]) as f32);
+            }
+        })
+    }
+
+    /// Not generic: modules have one copy of it.
+    fn from_rows(
+        region: LightRegion,
+        image: Extent,
+        read_row: &mut dyn FnMut(usize, &mut [f32]),
     ) -> Result<Self, LightError> {
         check_extent(image)?;
         let mut row = vec![0.0; 3 * image.width as usize];
@@ -195,85 +237,58 @@ impl Light {
                 None => Ok(()),
             }
         };
+        let extent = region.extent;
+        let mut elements = Vec::with_capacity(extent.area());
         // Nothing to resample; usual where a page animates its own light.
-        if image == extent {
-            let mut elements = Vec::with_capacity(extent.area());
+        if image == extent && extent == region.plane {
             for y in 0..extent.height as usize {
                 read_checked(y, &mut row)?;
                 elements.extend(row.as_chunks().0.iter().copied().map(element));
             }
-            return Ok(Self { extent, elements });
+        } else {
+            let mut resampler = AreaResampler::new(image, region);
+            for y in resampler.rows() {
+                read_checked(y, &mut row)?;
+                resampler.add_row(&row);
+            }
+            elements.extend(resampler.finish().map(element));
         }
-        let mut resampler = AreaResampler::new(image, extent);
-        for y in 0..image.height as usize {
-            read_checked(y, &mut row)?;
-            resampler.add_linear_row(&row);
-        }
-        let elements = resampler.finish().map(element).collect();
         Ok(Self { extent, elements })
     }
 
-    /// A light from a light image of any extent, resampled by area. `read_row` fills each row in turn with sRGB codes
-    /// and straight alpha; a pixel emits its alpha's share of its colour.
-    ///
-    /// # Errors
-    /// [`LightError::EmptyImage`].
-    pub fn from_srgb_rows(
-        extent: Extent,
-        image: Extent,
-        mut read_row: impl FnMut(usize, &mut [u8]),
-    ) -> Result<Self, LightError> {
-        check_extent(image)?;
-        let mut resampler = AreaResampler::new(image, extent);
-        let mut row = vec![0; 4 * image.width as usize];
-        for y in 0..image.height as usize {
-            read_row(y, &mut row);
-            resampler.add_srgb_row(&row);
-        }
-        let elements = resampler.finish().map(element).collect();
-        Ok(Self { extent, elements })
-    }
-
-    /// A warm Gaussian spot.
-    pub fn torch(extent: Extent, pose: TorchSpot) -> Self {
+    /// A warm Gaussian spot, placed on the whole light plane.
+    pub fn torch(region: impl Into<LightRegion>, pose: TorchSpot) -> Self {
         const WARM_WHITE: [f64; 3] = [1.0, 0.93, 0.80];
         let scale = 0.5 / (pose.radius * pose.radius).max(1e-6);
         // Separable: one exponential for each column and row, not for each element.
-        let profile = |length: u32, centre: f64| -> Vec<f64> {
-            let offsets = (0..length).map(|i| f64::from(i) + 0.5 - centre);
+        let profile = |elements: Range<u32>, centre: f64| -> Vec<f64> {
+            let offsets = elements.map(|i| f64::from(i) + 0.5 - centre);
             offsets.map(|d| (-d * d * scale).exp()).collect()
         };
-        let columns = profile(extent.width, pose.centre.u);
-        let rows = profile(extent.height, pose.centre.v);
-        Self::from_fn(extent, |p| {
-            let spot = columns[p.u as usize] * rows[p.v as usize];
-            WARM_WHITE.map(|c| (c * spot) as f32)
-        })
-    }
-
-    /// Flames along the lower edge at a time in seconds, which do not repeat. A time that is not finite counts as 0.
-    pub fn fire(extent: Extent, seconds: f64) -> Self {
-        let elements = fire::fire_emission(extent, seconds);
-        Self { extent, elements }
-    }
-
-    /// The elements of a part of the light plane, whose first has this column and row.
-    ///
-    /// # Panics
-    /// If the part is not on the light plane.
-    pub fn crop(&self, [column, row]: [u32; 2], extent: Extent) -> Self {
-        let width = self.extent.width as usize;
-        let rows = (row..row + extent.height).flat_map(|v| {
-            let start = v as usize * width + column as usize;
-            &self.elements[start..start + extent.width as usize]
-        });
+        let region = region.into();
+        let columns = profile(region.columns(), pose.centre.u);
+        let rows = profile(region.rows(), pose.centre.v);
+        let mut elements = Vec::with_capacity(region.extent.area());
+        for row in &rows {
+            let spots = columns.iter().map(|column| column * row);
+            elements.extend(spots.map(|spot| element(WARM_WHITE.map(|c| (c * spot) as f32))));
+        }
         Self {
-            extent,
-            elements: rows.copied().collect(),
+            extent: region.extent,
+            elements,
         }
     }
 
-    /// Extent of the light plane.
+    /// Flames along the lower edge at a time in seconds, which do not repeat. A time that is not finite counts as 0.
+    pub fn fire(region: impl Into<LightRegion>, seconds: f64) -> Self {
+        let region = region.into();
+        Self {
+            extent: region.extent,
+            elements: fire::fire_emission(region, seconds),
+        }
+    }
+
+    /// Extent of the light plane, or of the part of it.
     pub fn extent(&self) -> Extent {
         self.extent
     }
@@ -307,6 +322,7 @@ fn rainbow(x: f64) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::area_resample;
     use super::*;
 
     const PLANE: Extent = Extent::new(32, 16);
@@ -417,5 +433,34 @@ mod tests {
             linear(extent(2, 2), &values),
             Err(LightError::InvalidValue(3))
         );
+    }
+
+    #[test]
+    fn srgb_codes_are_decoded_before_they_are_averaged() {
+        let image = Extent::new(7, 5);
+        let rgba: Vec<u8> = (0..140).map(|i| (i * 89 % 256) as u8).collect();
+        let linear: Vec<f32> = rgba
+            .chunks(4)
+            .flat_map(|p| {
+                let linear = |code: u8| srgb::srgb_decode(f64::from(code) / 255.0);
+                [0, 1, 2].map(|c| (linear(p[c]) * f64::from(p[3]) / 255.0) as f32)
+            })
+            .collect();
+        for (width, height) in [(3, 2), (7, 5), (20, 11), (1, 1), (2, 9)] {
+            let plane = Extent::new(width, height);
+            let want = area_resample(&linear, image, plane);
+            let light = Light::from_srgb_rows(plane, image, |y, row| {
+                row.copy_from_slice(&rgba[28 * y..][..28]);
+            });
+            let elements = light.unwrap().elements;
+            for ([rgb @ .., _], want) in elements.iter().zip(want.as_chunks::<3>().0) {
+                for (got, want) in rgb.iter().zip(want) {
+                    assert!(
+                        (got - want).abs() <= 1e-6 * want,
+                        "{plane}: {got}, not {want}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::correspondence::Correspondence;
+use super::light_region::LightRegion;
 
 /// Camera channels: red, green, blue.
 pub const CHANNELS: usize = 3;
@@ -272,6 +273,11 @@ impl Geometry {
             tile_side,
         };
         geometry.validate()
+    }
+
+    /// The light plane, or the part of its level's that a shard sees.
+    pub fn light_region(&self) -> LightRegion {
+        self.correspondence.origin.light_region(self.light)
     }
 
     /// Tiles along a row and down a column.

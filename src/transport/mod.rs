@@ -19,8 +19,12 @@ mod float_tile;
 mod function_codes;
 mod geometry;
 mod known_transport;
+mod light_region;
 mod quantisation;
-#[cfg_attr(target_arch = "wasm32", path = "no_shard_origin.rs")]
+#[cfg_attr(
+    all(target_arch = "wasm32", feature = "recovery", not(feature = "drawing")),
+    path = "no_shard_origin.rs"
+)]
 mod shard_origin;
 mod singular_values;
 mod snr;
@@ -41,6 +45,7 @@ pub use geometry::{
     MAX_WINDOW, TileRect, Window,
 };
 pub use known_transport::{KnownTransport, transport_error};
+pub use light_region::LightRegion;
 pub(crate) use quantisation::ChannelPeaks;
 pub use shard_origin::ShardOrigin;
 pub use singular_values::SingularValueAnalysis;

@@ -2,6 +2,7 @@
 
 use super::displacement_grid::DisplacementGrid;
 use super::geometry::{Extent, LightPosition};
+use super::light_region::LightRegion;
 
 /// The first pixel and light element of a shard, in its level; zero for a whole picture.
 ///
@@ -13,6 +14,8 @@ pub struct ShardOrigin {
     pub camera: [u32; 2],
     /// Column and row of the first light element.
     pub light: [u32; 2],
+    /// Columns and rows of the level's light plane; zero for a whole picture.
+    pub plane: [u32; 2],
 }
 
 impl ShardOrigin {
@@ -20,7 +23,44 @@ impl ShardOrigin {
     pub const ZERO: Self = Self {
         camera: [0; 2],
         light: [0; 2],
+        plane: [0; 2],
     };
+
+    /// The part of its level's light plane that a shard with a light plane of `extent` sees.
+    pub(super) fn light_region(self, extent: Extent) -> LightRegion {
+        match self.plane {
+            [0, 0] => extent.into(),
+            [width, height] => LightRegion {
+                plane: Extent::new(width, height),
+                first: self.light,
+                extent,
+            },
+        }
+    }
+
+    /// Whether the light plane of a shard, of `extent`, lies within that of its level.
+    pub fn is_valid(self, extent: Extent) -> bool {
+        let is_in = |axis: usize, count: u32| {
+            let end = self.light[axis].checked_add(count);
+            end.is_some_and(|end| end <= self.plane[axis])
+        };
+        self == Self::ZERO || (is_in(0, extent.width) && is_in(1, extent.height))
+    }
+
+    /// The fields one after another.
+    pub fn to_numbers(self) -> [u32; 6] {
+        bytemuck::cast([self.camera, self.light, self.plane])
+    }
+
+    /// The inverse of [`to_numbers`](Self::to_numbers).
+    pub fn from_numbers(numbers: [u32; 6]) -> Self {
+        let [camera, light, plane] = bytemuck::cast(numbers);
+        Self {
+            camera,
+            light,
+            plane,
+        }
+    }
 
     /// A camera position of the shard in its level.
     pub(super) fn to_level(self, at: [f64; 2]) -> [f64; 2] {

@@ -1,4 +1,4 @@
-//! A picture of a level of a file, one row of shards at a time: pictures may be larger than memory. The light is not.
+//! A picture of a level of a file, one row of shards at a time: pictures and lights may be larger than memory.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -6,15 +6,13 @@ use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
 
+use super::light_image::LightSource;
 use super::{Colors, PictureArgs};
-use crate::cli::ltm_file::{LIMITS, read_range};
+use crate::cli::ltm_file::read_range;
 use crate::cli::output_file::InputError;
 use crate::pyramid::{PyramidReader, Shard};
 use crate::relight::{Light, Rgba8Picture, TorchSpot};
-use crate::transport::{Extent, LightPosition, TileRect};
-
-/// Bytes of a light element in memory.
-const LIGHT_ELEMENT_BYTES: u64 = 16;
+use crate::transport::{Extent, LightPosition, LightRegion, TileRect};
 
 /// A level of a file of several.
 pub struct Level<'a> {
@@ -53,7 +51,13 @@ impl<'a> Level<'a> {
         row: &mut dyn FnMut(&[[u8; 4]]) -> Result<()>,
     ) -> Result<()> {
         let colors = Colors::new(self.args, self.reader.root()).map_err(InputError)?;
-        let light = colors.convert(self.light().map_err(InputError)?);
+        let source = LightSource::load(&self.args.light).map_err(InputError)?;
+        let torch = self.torch();
+        let light_on = |region| match torch {
+            Some(spot) => Ok(Light::torch(region, spot)),
+            None => self.args.light_on(&source, region),
+        };
+        let light_on = |region| Ok(colors.convert(light_on(region)?));
         let side = self.reader.table().shard_side();
         let (mut y, end) = (region.y, region.y + region.extent.height);
         while y < end {
@@ -63,7 +67,7 @@ impl<'a> Level<'a> {
                 extent: Extent::new(region.extent.width, next - y),
                 ..region
             };
-            let picture = self.relight_rows(rows, &light, &colors);
+            let picture = self.relight_rows(rows, &light_on, &colors);
             let picture = picture.map_err(InputError)?;
             let mut rows = picture.pixels.chunks_exact(region.extent.width as usize);
             rows.try_for_each(&mut *row)?;
@@ -72,22 +76,10 @@ impl<'a> Level<'a> {
         Ok(())
     }
 
-    /// The light on the light plane of the level.
-    fn light(&self) -> Result<Light> {
-        let (args, number) = (self.args, self.args.level);
-        let table = self.reader.table();
-        let plane = table.light(number);
-        // Unlike a shard, it is in memory as a whole.
-        let elements = u64::from(plane.width) * u64::from(plane.height);
-        ensure!(
-            elements * LIGHT_ELEMENT_BYTES <= LIMITS.decoded_bytes,
-            "{}: level {} has {plane} light elements, which do not fit in memory; give a larger --level",
-            args.file.display(),
-            number
-        );
-        let Some([x, y]) = args.at else {
-            return args.light_on(plane);
-        };
+    /// The torch that `args` place, if they place one.
+    fn torch(&self) -> Option<TorchSpot> {
+        let [x, y] = self.args.at?;
+        let (table, number) = (self.reader.table(), self.args.level);
         // The correspondence of the root, whose pixels and elements are larger, at the place on level 0.
         let root = &self.reader.root().header.geometry;
         let (whole, level_0) = (table.camera(0), f64::from(1 << (table.levels() - 1)));
@@ -96,19 +88,22 @@ impl<'a> Level<'a> {
             y * f64::from(whole.height) / level_0,
         );
         let elements = f64::from(1 << (table.levels() - 1 - number));
-        let centre = LightPosition {
-            u: u * elements,
-            v: v * elements,
-        };
-        let spot = TorchSpot {
-            centre,
-            ..TorchSpot::central(plane)
-        };
-        Ok(Light::torch(plane, spot))
+        Some(TorchSpot {
+            centre: LightPosition {
+                u: u * elements,
+                v: v * elements,
+            },
+            ..TorchSpot::central(table.light(number))
+        })
     }
 
     /// The picture of some rows, which lie in one row of shards.
-    fn relight_rows(&self, rows: TileRect, light: &Light, colors: &Colors) -> Result<Rgba8Picture> {
+    fn relight_rows(
+        &self,
+        rows: TileRect,
+        light_on: &dyn Fn(LightRegion) -> Result<Light>,
+        colors: &Colors,
+    ) -> Result<Rgba8Picture> {
         let fetch = |range: Range<u64>| read_range(&mut self.file.borrow_mut(), range);
         let mut picture = Rgba8Picture::filled(rows.extent, [0; 4]);
         let width = rows.extent.width as usize;
@@ -116,8 +111,7 @@ impl<'a> Level<'a> {
             let shard = self.reader.shard(id, rows, fetch);
             let Shard { rect, transport } =
                 shard.with_context(|| format!("{}: {id}", self.args.file.display()))?;
-            let geometry = &transport.geometry;
-            let light = light.crop(geometry.correspondence.origin.light, geometry.light);
+            let light = light_on(transport.geometry.light_region())?;
             let relit = self.args.backend.picture(transport, &light, colors);
             let [left, right] = [rows.x, rows.x + rows.extent.width]
                 .map(|x| x.clamp(rect.x, rect.x + rect.extent.width));

@@ -12,7 +12,7 @@ use anyhow::{Context, Result, ensure};
 use clap::{Args, ValueEnum};
 
 use self::level::Level;
-use self::light_image::load_light;
+use self::light_image::LightSource;
 use super::ltm_file::{LIMITS, LtmFile, PrefixLength, open_ltm, read_ltm};
 use super::output_file::InputError;
 use super::process_resources::AllCoresExecutor;
@@ -21,7 +21,7 @@ use crate::format::FileIndex;
 use crate::pyramid::PyramidReader;
 use crate::relight::cpu::CpuRelighter;
 use crate::relight::{Light, OutputTransform, Rgba8Picture, TorchSpot, reference};
-use crate::transport::{ColorMatrix, Extent, TileRect, Transport, light_color_matrix};
+use crate::transport::{ColorMatrix, Extent, LightRegion, TileRect, Transport, light_color_matrix};
 
 /// A file, and the light to show it under.
 #[derive(Debug, Args)]
@@ -85,11 +85,11 @@ impl PictureArgs {
         }
     }
 
-    /// The light, but a torch that was placed, on a light plane.
-    fn light_on(&self, plane: Extent) -> Result<Light> {
+    /// The light, but a torch that was placed, on a part of a light plane. `source` is that of the light.
+    fn light_on(&self, source: &LightSource, region: LightRegion) -> Result<Light> {
         match self.time {
-            Some(seconds) => Ok(Light::fire(plane, seconds)),
-            None => load_light(&self.light, plane),
+            Some(seconds) => Ok(Light::fire(region, seconds)),
+            None => source.on(region),
         }
     }
 }
@@ -201,7 +201,7 @@ fn relight(args: &PictureArgs, file: LtmFile) -> Result<Rgba8Picture> {
     let colors = Colors::new(args, &file.index)?;
     let light = colors.convert(match args.at {
         Some([x, y]) => Light::torch(geometry.light, TorchSpot::behind(geometry, x, y)),
-        None => args.light_on(geometry.light)?,
+        None => args.light_on(&LightSource::load(&args.light)?, geometry.light.into())?,
     });
     Ok(args.backend.picture(file.transport, &light, &colors))
 }
