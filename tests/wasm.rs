@@ -381,7 +381,8 @@ async fn the_torch_is_behind_its_point_of_the_picture() {
     let canvas = new_canvas();
     let mut relighter = open_relighter("cpu", &photo, &canvas).await.unwrap();
     for (x, y) in [(0.25, 0.75), (0.5, 0.5), (0.8, 0.2)] {
-        let torch = WebLight::torch(&photo, x, y, Some(0.1)).unwrap();
+        let behind = photo.behind(x, y);
+        let torch = WebLight::torch(&photo, behind[0], behind[1], Some(0.1)).unwrap();
         relighter.render(&torch, 1.0).unwrap();
         let picture = read_back(&canvas);
         let (mut centroid, mut total) = ([0.0; 2], 0.0);

@@ -24,7 +24,7 @@ use crate::transport::Extent;
 /// Write a large relightable photograph as one of several levels, of which viewers fetch the part and the level that are
 /// seen
 ///
-/// The element does not show such files yet.
+/// The element shows such a file from its coarsest level on. Its server must support range requests.
 #[derive(Debug, Args)]
 pub struct EncodeArgs {
     /// Relightable photograph of one level

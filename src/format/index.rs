@@ -9,14 +9,18 @@ use super::constants::HEADER_BYTES;
 use super::directory;
 use super::displacement;
 use super::error::{FormatError, SectionName};
-use super::extension::{self, Extensions, FormatExtension};
+use super::extension::{self, Extensions, FormatExtension, TABLE_TAG};
 use super::header::{Header, SectionEntry};
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
 use super::levels::ShardPlace;
 use super::memory_budget::MemoryBudget;
+#[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
+use super::memory_estimate;
 use super::metadata::MetadataText;
 use super::scan::{ProgressiveScan, ScanCoding, rank_of};
 use crate::transport::Geometry;
+#[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
+use crate::transport::{Decibels, TEXEL_COMPONENTS};
 
 /// Everything that precedes the first scan.
 #[derive(Clone, Debug)]
@@ -55,17 +59,17 @@ impl FileIndex {
             displacement,
             others,
         } = extension::decode(extensions, budget)?;
+        #[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
+        if let Some(place) = ShardPlace::decode(&others, header.geometry.light)
+            .map_err(|error| error.in_section(SectionName::Extensions))?
+        {
+            header.geometry.correspondence.origin = place.origin;
+        }
         let Geometry {
             camera,
             correspondence,
             ..
         } = &mut header.geometry;
-        #[cfg(not(target_arch = "wasm32"))]
-        if let Some(place) = ShardPlace::decode(&others)
-            .map_err(|error| error.in_section(SectionName::Extensions))?
-        {
-            correspondence.origin = place.origin;
-        }
         if let Some(data) = displacement {
             let covered = |spacing| correspondence.origin.covered(*camera, spacing);
             let grid = displacement::decode(data, covered, budget)
@@ -91,6 +95,33 @@ impl FileIndex {
             true => Ok(index),
             false => Err(FormatError::LengthMismatch { end, file_bytes }),
         }
+    }
+
+    /// Whether the file is the root of one of several levels, which follow it.
+    pub fn has_levels(&self) -> bool {
+        self.has_extension(TABLE_TAG)
+    }
+
+    /// The largest number of components, in fours, whose coefficients take at most `bytes` in memory; at least four.
+    #[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
+    pub fn rank_within(&self, bytes: u64) -> usize {
+        let four = memory_estimate::coefficient_bytes(&self.header, TEXEL_COMPONENTS);
+        TEXEL_COMPONENTS
+            * usize::try_from(bytes / four.max(1))
+                .unwrap_or(usize::MAX / 8)
+                .max(1)
+    }
+
+    /// The SNR after the last scan that has any of the first `rank` components.
+    #[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
+    pub fn snr_of_rank(&self, rank: usize) -> Option<Decibels> {
+        let mut scans = self.scans.iter().rev();
+        let last = scans.find(|scan| scan.coding.is_direct() || usize::from(scan.first) < rank);
+        last.map(|scan| scan.snr)
+    }
+
+    pub(super) fn has_extension(&self, tag: [u8; 4]) -> bool {
+        self.extensions.iter().any(|extension| extension.tag == tag)
     }
 
     /// Assembles the index of a file, and its bytes. There is an entry for each scan and tile.

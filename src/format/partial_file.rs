@@ -180,7 +180,10 @@ impl PartialFile {
         }
         while !bytes.is_empty() {
             if offset >= end {
-                return Err(FormatError::TrailingBytes(end));
+                return match self.index.has_levels() {
+                    true => Ok(()), // the other levels
+                    false => Err(FormatError::TrailingBytes(end)),
+                };
             }
             let chunk = self.index.chunk_at(offset);
             let range = self.index.range(chunk);
@@ -343,6 +346,16 @@ impl PartialFile {
             Err(FormatError::Limit { .. }) => Ok(None),
             Err(error) => Err(error),
         }
+    }
+
+    /// The transport by the first `rank` components of all chunks so far.
+    pub fn components(
+        &self,
+        rank: usize,
+        budget: &MemoryBudget,
+    ) -> Result<(Transport, MetadataText), FormatError> {
+        let transport = self.transport(rank.min(self.basis.rank()), budget)?;
+        Ok((transport, self.index.metadata.clone()))
     }
 
     fn transport(&self, rank: usize, budget: &MemoryBudget) -> Result<Transport, FormatError> {

@@ -220,6 +220,21 @@ impl LtmReader {
         }
     }
 
+    /// The light transport by the first `rank` components, of all chunks received so far.
+    ///
+    /// # Errors
+    /// [`FormatError::Truncated`] if the index is not complete, [`FormatError::DamagedSection`] if a chunk did not decode,
+    /// and the errors of the budget.
+    pub fn finish_components(self, rank: usize) -> Result<(Transport, MetadataText), FormatError> {
+        let Some(state) = &self.state else {
+            return Err(self.truncated());
+        };
+        match state.undecodable() {
+            Some(chunk) => Err(damaged("its values are missing").in_chunk(chunk)),
+            None => state.components(rank, &self.budget),
+        }
+    }
+
     /// The light transport of all chunks received so far, once the index is complete.
     ///
     /// # Errors

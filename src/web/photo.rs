@@ -5,6 +5,8 @@ use std::sync::Arc;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, photo_transfer};
+#[cfg(feature = "drawing")]
+use crate::relight::TorchSpot;
 use crate::transport::{Geometry, Tile, Transport};
 
 /// A photograph, with all or some of its tiles.
@@ -63,6 +65,13 @@ impl Photo {
             #[cfg(any(feature = "decoder", feature = "recovery"))]
             metadata: String::new(),
         })
+    }
+
+    /// The position on the light plane straight behind a point of the picture, in light elements. The point is given by
+    /// fractions of the picture's width and height.
+    pub fn behind(&self, x: f64, y: f64) -> Vec<f64> {
+        let TorchSpot { centre, .. } = TorchSpot::behind(self.geometry(), x, y);
+        vec![centre.u, centre.v]
     }
 
     /// Puts in a tile of [`takeTile`](Self::take_tile).

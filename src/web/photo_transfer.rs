@@ -3,7 +3,7 @@
 
 use super::CodedError;
 #[cfg(feature = "drawing")]
-use crate::transport::{Basis, Correspondence, TexelCodes, TileRect, Transport};
+use crate::transport::{Basis, Correspondence, ShardOrigin, TexelCodes, TileRect, Transport};
 use crate::transport::{CHANNELS, Geometry, Tile};
 
 /// The first bytes of a packed tile.
@@ -21,11 +21,14 @@ pub fn corrupt() -> CodedError {
     CodedError::internal("data was corrupted on its way from another worker or module")
 }
 
-/// Grids, window, tile side and correspondence, as `unpack_transport` reads them.
+/// Grids, window, tile side, shard origin and correspondence, as `unpack_transport` reads them.
 #[cfg(any(feature = "decoder", feature = "recovery"))]
 pub fn pack_geometry(geometry: &Geometry) -> Vec<f64> {
-    let sides = geometry.sides().into_iter().flatten().map(f64::from);
-    sides.chain(geometry.correspondence.to_numbers()).collect()
+    let origin = geometry.correspondence.origin.to_numbers();
+    let grids: [u32; 12] = bytemuck::cast([bytemuck::cast(geometry.sides()), origin]);
+    let mut numbers = grids.map(f64::from).to_vec();
+    numbers.extend(geometry.correspondence.to_numbers());
+    numbers
 }
 
 /// The bytes of a tile.
@@ -45,10 +48,12 @@ pub fn pack_tile(tile: &Tile) -> Vec<u8> {
 /// [`corrupt`] if the values describe no transport.
 #[cfg(feature = "drawing")]
 pub fn unpack_transport(geometry: &[f64], basis: &[f32]) -> Result<Transport, CodedError> {
-    let (sides, correspondence) = geometry.split_first_chunk::<6>().ok_or_else(corrupt)?;
-    let correspondence = Correspondence::from_numbers(correspondence).ok_or_else(corrupt)?;
-    let sides = bytemuck::cast(sides.map(|side| side as u32));
-    let geometry = Geometry::from_sides(sides, correspondence);
+    let (grids, correspondence) = geometry.split_first_chunk().ok_or_else(corrupt)?;
+    let mut correspondence = Correspondence::from_numbers(correspondence).ok_or_else(corrupt)?;
+    let [sides, origin]: [[u32; 6]; 2] =
+        bytemuck::cast::<[u32; 12], _>(grids.map(|n: f64| n as u32));
+    correspondence.origin = ShardOrigin::from_numbers(origin);
+    let geometry = Geometry::from_sides(bytemuck::cast(sides), correspondence);
     let geometry = geometry.map_err(|_| corrupt())?;
     let functions = basis.chunks_exact(geometry.window.area());
     if !functions.remainder().is_empty() {

@@ -20,6 +20,8 @@ export const LIGHTS = ['flood', 'torch', 'checkerboard', 'stripes', 'spectrum', 
 
 const GLASS = join(FOLDER, 'glass.ltm');
 export const TALL_FILE = join(FOLDER, 'tall.ltm');
+/** 523 x 41 pixels in three levels: shards of 256 pixels, and a root of 131 x 11. */
+export const LEVELS_FILE = join(FOLDER, 'levels.ltm');
 /** The tall photograph has one tile in each row of tiles, so up to four workers share it. */
 export const TALL_TILE_ROWS = 4;
 const TILE_SIDE_PX = 128;
@@ -63,6 +65,7 @@ export function makeTestPhotos() {
     .update(readFileSync(program))
     .update(readFileSync(import.meta.filename))
     .update(readFileSync('tests/fixtures/glass-s/capture.json'))
+    .update(readFileSync('tests/fixtures/format/levels.ltm'))
     .digest('hex');
   const stamp = join(FOLDER, '../made-by');
   if (!existsSync(stamp) || readFileSync(stamp, 'utf8') !== build) {
@@ -70,6 +73,7 @@ export function makeTestPhotos() {
     mkdirSync(FOLDER, { recursive: true });
     run('recover', 'tests/fixtures/glass-s', '-o', GLASS);
     makeTallPhoto();
+    copyFileSync('tests/fixtures/format/levels.ltm', LEVELS_FILE);
     writeDamagedCopies();
     writeFileSync(LIGHT_IMAGE_FILE, encodePng(LIGHT_IMAGE));
     writeFileSync(stamp, build);

@@ -4,7 +4,7 @@ use js_sys::{Float32Array, Uint8ClampedArray};
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::relight::{BuiltinLight, Light, LightError, TorchSpot};
-use crate::transport::{CHANNELS, Extent};
+use crate::transport::{CHANNELS, Extent, LightPosition};
 use crate::web::{CodedError, Photo};
 
 /// The emission of each element of a photograph's light plane.
@@ -19,29 +19,24 @@ impl WebLight {
     /// Code `light-name` for other names.
     pub fn builtin(photo: &Photo, name: &str) -> Result<WebLight, CodedError> {
         let light = BuiltinLight::from_name(name).ok_or_else(|| {
-            let names = BuiltinLight::BY_NAME.map(|(name, _)| name).join(", ");
-            CodedError::new(
-                "light-name",
-                format!("unknown built-in light '{name}'; use one of {names}"),
-            )
+            let names = "use one of flood, torch, checkerboard, stripes, spectrum, fire";
+            let message = ["unknown built-in light '", name, "'; ", names].concat();
+            CodedError::new("light-name", message)
         })?;
-        Ok(Self(light.render(photo.geometry().light)))
+        Ok(Self(light.render(photo.geometry().light_region())))
     }
 
-    /// A torch straight behind a point of the picture, or outside it: `x` and `y` are 0 to 1 from left to right and from
-    /// top to bottom. `size` is the radius as a fraction of the light plane's shorter side.
+    /// A torch at a position on the light plane, in light elements from its top left corner, or outside it. `size` is the
+    /// radius as a fraction of the light plane's shorter side.
     ///
     /// # Errors
     /// Code `light-value` for values that are out of range.
-    pub fn torch(photo: &Photo, x: f64, y: f64, size: Option<f64>) -> Result<WebLight, CodedError> {
+    pub fn torch(photo: &Photo, u: f64, v: f64, size: Option<f64>) -> Result<WebLight, CodedError> {
         let size = size.unwrap_or(TorchSpot::DEFAULT_RADIUS);
         // Squares of larger distances could overflow.
-        const MAX_DISTANCE: f64 = 1e6;
-        if !(x.abs() <= MAX_DISTANCE
-            && y.abs() <= MAX_DISTANCE
-            && size > 0.0
-            && size <= MAX_DISTANCE)
-        {
+        const MAX_DISTANCE: f64 = 1e12;
+        const MAX_SIZE: f64 = 1e6;
+        if !(u.abs() <= MAX_DISTANCE && v.abs() <= MAX_DISTANCE && size > 0.0 && size <= MAX_SIZE) {
             // Without the values: code that prints floats would add more to the module than the torch.
             return Err(CodedError::new(
                 "light-value",
@@ -49,13 +44,13 @@ impl WebLight {
                  positive fraction of the light plane",
             ));
         }
-        let geometry = photo.geometry();
-        let side = f64::from(geometry.light.width.min(geometry.light.height));
+        let region = photo.geometry().light_region();
+        let side = f64::from(region.plane.width.min(region.plane.height));
         let pose = TorchSpot {
+            centre: LightPosition { u, v },
             radius: size * side,
-            ..TorchSpot::behind(geometry, x, y)
         };
-        Ok(Self(Light::torch(geometry.light, pose)))
+        Ok(Self(Light::torch(region, pose)))
     }
 
     /// Flames along the lower edge at a time in seconds. The built-in light `fire` is time 0.
@@ -69,10 +64,11 @@ impl WebLight {
                 "the time of the fire must be a finite number of seconds",
             ));
         }
-        Ok(Self(Light::fire(photo.geometry().light, seconds)))
+        Ok(Self(Light::fire(photo.geometry().light_region(), seconds)))
     }
 
-    /// A light image in linear RGB, 0 to 1 at full brightness, row by row. It is resampled by area.
+    /// A light image in linear RGB, 0 to 1 at full brightness, row by row. It covers the light plane and is resampled by
+    /// area; with `elements` it has the photograph's elements, which of a shard are a part of its light plane.
     ///
     /// # Errors
     /// Code `light-size` for another number of values, `light-value` for negative or infinite values.
@@ -82,9 +78,14 @@ impl WebLight {
         values: &Float32Array,
         width: u32,
         height: u32,
+        elements: Option<bool>,
     ) -> Result<WebLight, CodedError> {
         let image = image_extent(values.length(), 3, width, height)?;
-        let light = Light::from_linear_rows(photo.geometry().light, image, |y, row| {
+        let region = match elements {
+            Some(true) => photo.geometry().light.into(),
+            _ => photo.geometry().light_region(),
+        };
+        let light = Light::from_linear_rows(region, image, |y, row| {
             let (first, end) = (y * row.len(), (y + 1) * row.len());
             values.subarray(first as u32, end as u32).copy_to(row);
         })?;
@@ -104,7 +105,7 @@ impl WebLight {
         height: u32,
     ) -> Result<WebLight, CodedError> {
         let image = image_extent(rgba.length(), 4, width, height)?;
-        let light = Light::from_srgb_rows(photo.geometry().light, image, |y, row| {
+        let light = Light::from_srgb_rows(photo.geometry().light_region(), image, |y, row| {
             let (first, end) = (y * row.len(), (y + 1) * row.len());
             rgba.subarray(first as u32, end as u32).copy_to(row);
         })?;

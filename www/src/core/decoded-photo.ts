@@ -14,7 +14,9 @@ export class LtmPhotograph implements CorePhotograph {
   #isFreed = false;
 
   constructor(readonly photograph: LoadedPhotograph) {
-    Object.assign(this, photograph.info);
+    // Of a file of several levels it is the last one.
+    const { width, height, lightWidth, lightHeight } = photograph.descriptor;
+    Object.assign(this, photograph.info, { width, height, lightWidth, lightHeight });
   }
 
   free(): void {

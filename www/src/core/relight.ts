@@ -114,7 +114,10 @@ function createLight(
   light: LightDescriptor,
 ): Light {
   if (typeof light === 'string') return Light.builtin(modulePhoto, parseLight(light));
-  if ('x' in light) return Light.torch(modulePhoto, light.x, light.y, light.size);
+  if ('x' in light) {
+    const [u = 0, v = 0] = modulePhoto.behind(light.x, light.y);
+    return Light.torch(modulePhoto, u, v, light.size);
+  }
   const { data, width, height } = light;
   if (data instanceof Float32Array) return Light.fromLinear(modulePhoto, data, width, height);
   return Light.fromSrgb(modulePhoto, data, width, height);

@@ -7,6 +7,7 @@ import { fetchStrings, isPending, observeTranslations } from '../i18n/translatio
 import type { InteractionController } from '../input/interaction.js';
 import { reducedMotion } from '../input/reduced-motion.js';
 import type { TransitionOptions } from '../input/transitions.js';
+import type { LayerChangeEvent } from '../levels/shard-layer.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { PhotographSource } from '../photo/types.js';
@@ -23,7 +24,7 @@ import { AttributeReader } from '../state/attribute-reader.js';
 import { type ElementOptions, readOptions } from '../state/options.js';
 import { checkFields, type LightValue } from '../state/page-light.js';
 import { ViewerState } from '../state/viewer-state.js';
-import { clampView, type ZoomView } from '../state/viewport.js';
+import { clampView, type PictureRect, viewOf, type ZoomView } from '../state/viewport.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
 import { ViewerUi } from '../ui/viewer-ui.js';
 import { EarlyInput } from './early-input.js';
@@ -82,6 +83,11 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
       this.dismissPoster();
     });
     this.#dom.retryButton.addEventListener('click', () => this.load());
+    this.#dom.content.addEventListener('change', (event) => {
+      const { detail } = event as LayerChangeEvent;
+      if (detail) this.warn(detail);
+      else this.session.redraw();
+    });
     host.addEventListener('fullscreenchange', () => this.schedule());
   }
 
@@ -125,7 +131,8 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   /** Reads attributes that may have changed in the current script. */
   readOptions(): ElementOptions {
     const { state } = this;
-    state.options = readOptions(this.#reader, state.options);
+    const { width = 0, height = 0 } = this.session.photo?.info ?? {};
+    state.options = readOptions(this.#reader, state.options, Math.max(width, height));
     return state.options;
   }
 
@@ -188,7 +195,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     else this.setLight(light);
   }
 
-  async viewTo(view: Partial<ZoomView>, options: TransitionOptions): Promise<void> {
+  async viewTo(view: Partial<ZoomView> | PictureRect, options: TransitionOptions): Promise<void> {
     const target = this.#completeView(view);
     if (!this.#interaction) await this.#fetchInput();
     if (this.#interaction) await this.#interaction.viewTo(target, options);
@@ -203,8 +210,9 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   }
 
   /** The current view with other values. @throws {TypeError} for an invalid field */
-  #completeView(view: Partial<ZoomView>): ZoomView {
-    checkFields(view, 'view', ['zoom', 'x', 'y']);
+  #completeView(wanted: Partial<ZoomView> | PictureRect): ZoomView {
+    checkFields(wanted, 'view', ['zoom', 'x', 'y', 'width', 'height']);
+    const view = 'width' in wanted ? viewOf(wanted) : wanted;
     const { maxZoom } = this.readOptions();
     const last = this.state.view;
     const zoom = view.zoom ?? last.zoom;
@@ -320,8 +328,8 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
         this.status.set('ready');
         this.#dispatch(new Event('load'));
       },
-      rendererChanged: ({ canvas }) => {
-        this.#dom.showCanvas(canvas);
+      rendererChanged: ({ canvas, layer }) => {
+        this.#dom.showCanvas(canvas, layer, this.session.photo?.info ?? canvas);
         this.schedule();
       },
       backendChanged: (backend, previous, reason) =>

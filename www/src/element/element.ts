@@ -8,7 +8,7 @@ import type { PhotoError } from '../shared/errors.js';
 import type { Backend, Gamut, LightName } from '../shared/keywords.js';
 import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
 import type { LightValue } from '../state/page-light.js';
-import { pointAt, positionOf, type ZoomView } from '../state/viewport.js';
+import { type PictureRect, pointAt, positionOf, type ZoomView } from '../state/viewport.js';
 import { ElementController } from './element-controller.js';
 import { encodePicture } from './encode-picture.js';
 import type { RelightablePhotoEventMap } from './events.js';
@@ -191,8 +191,11 @@ export class RelightablePhotoElement extends Base {
     return this.#controller.lightTo(light, options);
   }
 
-  /** Moves to another `view`. Resolves as `lightTo` does. */
-  viewTo(view: Partial<ZoomView>, options: TransitionOptions = {}): Promise<void> {
+  /**
+   * Moves to another `view`, or to the part of the picture `{ x, y, width, height }`, whose corner and size are fractions of
+   * the picture. Resolves as `lightTo` does.
+   */
+  viewTo(view: Partial<ZoomView> | PictureRect, options: TransitionOptions = {}): Promise<void> {
     return this.#controller.viewTo(view, options);
   }
 

@@ -5,12 +5,15 @@ import { PhotoError } from '../shared/errors.js';
 
 type DrawnCanvas = Pick<Renderer, 'canvas' | 'gamut'>;
 
+/** Maximum side of a picture of several levels, in pixels: what all browsers have canvases for. */
+const MAX_SNAPSHOT_SIDE = 4096;
+
 /**
  * Reads the canvas at once: that of a GPU keeps its content only until the next frame. `quality` is that of
  * `HTMLCanvasElement.toBlob`.
  */
 export function encodePicture(
-  picture: DrawnCanvas,
+  renderer: DrawnCanvas & Pick<Renderer, 'snapshot'>,
   type: string,
   quality: number | undefined,
   scale: number,
@@ -20,7 +23,9 @@ export function encodePicture(
       blob
         ? resolve(blob)
         : reject(new PhotoError('internal', `The browser could not encode ${type}.`));
-    const canvas = scale === 1 ? picture.canvas : resample(picture, scale);
+    const whole = renderer.snapshot?.(MAX_SNAPSHOT_SIDE) ?? renderer.canvas;
+    const { gamut } = renderer;
+    const canvas = scale === 1 ? whole : resample({ canvas: whole, gamut }, scale);
     canvas.toBlob(settle, type, quality);
   });
 }

@@ -3,6 +3,7 @@
 import { CENTRE } from '../shared/value-types.js';
 import {
   DEFAULT_TORCH_SIZE,
+  EMPTY_ZOOM,
   type LoadingMode,
   type PARSERS,
   type ParsedValue,
@@ -66,7 +67,8 @@ export interface ReflectedProperties {
   /** Shows buttons: lights, play and pause, zoom, reset, tilt (on hand-held devices), full screen. */
   controls: boolean;
   /**
-   * Largest magnification; 8 if the attribute has no value. Without the attribute, and at 1, the picture does not zoom.
+   * Largest magnification; if the attribute has no value 8, or as much as shows the pixels of a larger picture. Without the
+   * attribute, and at 1, the picture does not zoom.
    */
   zoom: number;
   /**
@@ -110,7 +112,7 @@ const REFLECTED: {
   loading: parsed('loading'),
   reveal: parsed('reveal'),
   controls: flag('controls'),
-  zoom: number('zoom'),
+  zoom: number('zoom', EMPTY_ZOOM),
   cooperativeGestures: flag('cooperative-gestures'),
   autoplayLight: flag('autoplay-light'),
   kiosk: number('kiosk'),

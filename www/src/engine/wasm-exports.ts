@@ -48,6 +48,8 @@ export interface DecodedPhoto extends ModulePhoto, Omit<PhotoInfo, 'metadata'> {
 export interface ImportedPhoto extends ModulePhoto {
   /** Moves a tile of `takeTile` in. Not allowed while a CPU relighter uses the photograph. */
   putTile(index: number, bytes: Uint8Array): void;
+  /** The position on the light plane behind a point of the picture: column and row, in light elements. */
+  behind(x: number, y: number): Float64Array;
 }
 
 /** The emission of the light elements. */
@@ -65,6 +67,10 @@ export interface Decoder extends Freeable {
   /** Bytes that were fed; repeated ones count once. */
   readonly bytesFed: number;
   readonly fileBytes: number | undefined;
+  /** Bytes of all levels; `fileBytes` if there is one. */
+  readonly bytesOfLevels: number | undefined;
+  /** The table of levels, as `LevelTable` reads it, once `fileBytes` is known; empty if there is one level. */
+  levels(): Float64Array;
   /** Scans that are complete for every tile. */
   readonly scansDone: number;
   /** A coarser photograph; `undefined` before the first scan is complete, and once the file is. */
@@ -116,7 +122,8 @@ export interface RowRangeRelighter extends Freeable {
 export interface DecoderModule {
   /** Gives the started module's exports. */
   default(): Promise<{ readonly memory: Pick<WebAssembly.Memory, 'buffer'> }>;
-  Decoder: { new (maxDecodedBytes?: number): Decoder };
+  /** With `maxTileBytes` it wants the first scans only, as far as their tiles take no more memory. */
+  Decoder: { new (maxDecodedBytes?: number, maxTileBytes?: number): Decoder };
 }
 
 /** What the modules of all backends export. */
@@ -128,10 +135,20 @@ export interface RelightModule {
   /** The photograph may be one without tiles. */
   Light: {
     builtin(photo: ImportedPhoto, name: string): Light;
-    torch(photo: ImportedPhoto, x: number, y: number, size?: number): Light;
+    /** `u` and `v` are in light elements of the whole light plane, also for a shard. */
+    torch(photo: ImportedPhoto, u: number, v: number, size?: number): Light;
     fire(photo: ImportedPhoto, seconds: number): Light;
-    /** From linear RGB of a picture of any size, row by row. */
-    fromLinear(photo: ImportedPhoto, values: Float32Array, width: number, height: number): Light;
+    /**
+     * From linear RGB of a picture of any size, which covers the light plane, row by row; with `elements` from that of the
+     * photograph's own elements.
+     */
+    fromLinear(
+      photo: ImportedPhoto,
+      values: Float32Array,
+      width: number,
+      height: number,
+      elements?: boolean,
+    ): Light;
     /** From sRGB codes with straight alpha of a picture of any size: RGBA, row by row. */
     fromSrgb(photo: ImportedPhoto, rgba: Uint8ClampedArray, width: number, height: number): Light;
   };

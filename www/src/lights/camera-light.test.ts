@@ -64,7 +64,11 @@ test('lights are converted and freed only where there is a colour matrix', () =>
   } as unknown as Pick<RelightModule, 'Light'>;
   const plane = {} as ImportedPhoto;
   const info = { lightWidth: 1, lightHeight: 1 };
-  const photograph = (hasColorMatrix: boolean) => ({ colorMatrix: MATRIX, hasColorMatrix, info });
+  const photograph = (hasColorMatrix: boolean) => ({
+    colorMatrix: MATRIX,
+    hasColorMatrix,
+    descriptor: info,
+  });
   const old = light('old', Float32Array.of(1, 1, 1));
   assert.equal(cameraLightConverter(module, plane, photograph(false))(old), old);
   assert.deepEqual(freed, []);

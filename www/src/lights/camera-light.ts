@@ -12,18 +12,18 @@ export type LightConverter = (light: Light) => Light;
 export interface CameraColors {
   readonly colorMatrix: ColorMatrix;
   readonly hasColorMatrix: boolean;
-  readonly info: Pick<PhotoInfo, 'lightWidth' | 'lightHeight'>;
+  readonly descriptor: Pick<PhotoInfo, 'lightWidth' | 'lightHeight'>;
 }
 
 /** Frees the light that it converts. `lightPlane` is a photograph without tiles. */
 export function cameraLightConverter(
   { Light }: Pick<RelightModule, 'Light'>,
   lightPlane: ImportedPhoto,
-  { colorMatrix, hasColorMatrix, info }: CameraColors,
+  { colorMatrix, hasColorMatrix, descriptor }: CameraColors,
 ): LightConverter {
   const matrix = hasColorMatrix ? lightColorMatrix(colorMatrix) : null;
   if (!matrix) return (light) => light;
-  const { lightWidth, lightHeight } = info;
+  const { lightWidth, lightHeight } = descriptor;
   const [toRed, toGreen, toBlue] = matrix;
   return (light) => {
     const values = light.linearRgb(0, lightHeight);
@@ -36,7 +36,7 @@ export function cameraLightConverter(
       values[i + 1] = Math.max(0, toGreen[0] * red + toGreen[1] * green + toGreen[2] * blue);
       values[i + 2] = Math.max(0, toBlue[0] * red + toBlue[1] * green + toBlue[2] * blue);
     }
-    return Light.fromLinear(lightPlane, values, lightWidth, lightHeight);
+    return Light.fromLinear(lightPlane, values, lightWidth, lightHeight, true);
   };
 }
 

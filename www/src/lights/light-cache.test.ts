@@ -38,6 +38,7 @@ function createCache() {
   const cache = new LightCache(
     module as unknown as Pick<RelightModule, 'Light'>,
     {
+      behind: (x: number, y: number) => Float64Array.of(100 * x, 10 * y),
       free: () => {},
     } as unknown as ImportedPhoto,
   );
@@ -83,9 +84,9 @@ test('the last light substitutes for an unreadable image, and the built-in light
 test('a torch has a size, and a fire has a time', () => {
   const { cache, live } = createCache();
   cache.get({ name: 'torch', torch: { x: 0.2, y: 0.3 }, size: 0.5, image: null });
-  assert.deepEqual([...live], ['torch 0.2 0.3 0.5']);
+  assert.deepEqual([...live], ['torch 20 3 0.5']);
   cache.get({ name: 'torch', torch: null, size: 0.5, image: null });
-  assert.deepEqual([...live], ['torch 0.5 0.5 0.5']);
+  assert.deepEqual([...live], ['torch 50 5 0.5']);
   cache.get({ name: 'fire', torch: null, seconds: 0.1, image: null });
   assert.deepEqual([...live], ['fire 0.1']);
   cache.get({ name: 'fire', torch: null, seconds: 0.2, image: null });

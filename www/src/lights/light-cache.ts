@@ -2,6 +2,7 @@
 
 import type { Freeable, ImportedPhoto, Light, RelightModule } from '../engine/wasm-exports.js';
 import { type PhotoError, toPhotoError } from '../shared/errors.js';
+import type { PicturePoint } from '../shared/value-types.js';
 import { type CameraColors, cameraLightConverter, type LightConverter } from './camera-light.js';
 import { createBuiltinLight, type LightSetting } from './light-setting.js';
 
@@ -17,6 +18,8 @@ export interface AppliedLightStatus {
 export interface LitPhotograph extends CameraColors {
   /** A photograph without tiles in a module. */
   createLightPlane(module: RelightModule): ImportedPhoto;
+  /** For a shard, as `LoadedPhotograph` has it. */
+  readonly root?: { readonly photograph: LitPhotograph; readonly scale: number } | null;
 }
 
 export class LightCache implements Freeable {
@@ -29,12 +32,19 @@ export class LightCache implements Freeable {
     private readonly module: Pick<RelightModule, 'Light'>,
     private readonly lightPlane: ImportedPhoto,
     private readonly convert: LightConverter = (light) => light,
+    /** The photograph whose picture the torch's position is on, freed with the cache; and its scale. */
+    private readonly picture: ImportedPhoto = lightPlane,
+    private readonly scale = 1,
   ) {}
 
   /** A cache of lights for a photograph. */
   static of(module: RelightModule, photograph: LitPhotograph): LightCache {
     const lightPlane = photograph.createLightPlane(module);
-    return new LightCache(module, lightPlane, cameraLightConverter(module, lightPlane, photograph));
+    const convert = cameraLightConverter(module, lightPlane, photograph);
+    const { root } = photograph;
+    if (!root) return new LightCache(module, lightPlane, convert);
+    const picture = root.photograph.createLightPlane(module);
+    return new LightCache(module, lightPlane, convert, picture, root.scale);
   }
 
   /**
@@ -59,7 +69,11 @@ export class LightCache implements Freeable {
     if (this.#light && isCurrent) return { light: this.#light, lightApplied, lightError };
     // Lights are large: free the old one before making the new one.
     this.#replace(null, null);
-    const light = this.convert(createBuiltinLight(this.module, this.lightPlane, setting));
+    const behind = ({ x, y }: PicturePoint): [number, number] => {
+      const [u = 0, v = 0] = this.picture.behind(x, y);
+      return [u * this.scale, v * this.scale];
+    };
+    const light = this.convert(createBuiltinLight(this.module, this.lightPlane, setting, behind));
     this.#replace(light, setting);
     return { light, lightApplied, lightError };
   }
@@ -67,6 +81,7 @@ export class LightCache implements Freeable {
   free(): void {
     this.#replace(null, null);
     this.lightPlane.free();
+    if (this.picture !== this.lightPlane) this.picture.free();
   }
 
   #replace(light: Light | null, setting: LightSetting | null): void {

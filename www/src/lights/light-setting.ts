@@ -35,15 +35,16 @@ export interface ImageLight {
 
 export const PENDING_IMAGE: ImageLight = { uploadable: () => null, createLight: () => null };
 
+/** `behind` gives the position on the light plane behind a point of the picture, in light elements. */
 export function createBuiltinLight(
   { Light }: Pick<RelightModule, 'Light'>,
   photo: ImportedPhoto,
   { name, torch, size, seconds = 0 }: LightSetting,
+  behind: (point: PicturePoint) => readonly [u: number, v: number],
 ): Light {
   if (name === 'fire') return Light.fire(photo, seconds);
   if (name === 'torch' && (torch || size !== undefined)) {
-    const { x, y } = torch ?? CENTRE;
-    return Light.torch(photo, x, y, size);
+    return Light.torch(photo, ...behind(torch ?? CENTRE), size);
   }
   return Light.builtin(photo, name);
 }

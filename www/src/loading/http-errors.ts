@@ -91,6 +91,11 @@ export function rangeRefused(url: string, range: ByteRange): PhotoError {
   return fileError('http-range', url, `could not be loaded: ${reason}.`);
 }
 
+/** The server sends the whole file in place of a shard. */
+export function rangeIgnored(url: string): PhotoError {
+  return fileError('http-range', url, 'is shown coarsely: its server must support range requests.');
+}
+
 /** The last part of a URL's path. */
 export function fileName(url: string): string {
   const path = url.split(/[?#]/, 1)[0] ?? url;

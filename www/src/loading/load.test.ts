@@ -43,6 +43,14 @@ class FakeDecoder implements Decoder {
     return this.bytesFed < 144 ? undefined : this.#bytes.readUInt32LE(0);
   }
 
+  get bytesOfLevels(): number | undefined {
+    return this.fileBytes;
+  }
+
+  levels(): Float64Array {
+    return new Float64Array();
+  }
+
   wants(): Float64Array {
     const headBytes = this.bytesFed < 144 ? FIRST_BYTES : this.#bytes.readUInt32LE(4);
     const end = this.bytesFed < headBytes ? headBytes : (this.fileBytes ?? 0);

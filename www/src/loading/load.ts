@@ -2,15 +2,14 @@
 
 import type { LoadOptions } from '../photo/load-options.js';
 import type { PhotoDecoder } from '../photo/photo-decoder.js';
-import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { LoadedPhotograph, ShardRequest } from '../photo/photograph.js';
 import { endSentence, hasCode, PhotoError, toPhotoError } from '../shared/errors.js';
 import { linkedController, withTimeout } from '../shared/promises.js';
-import type { ByteRange } from '../shared/value-types.js';
-import { fileName, tooLong } from './http-errors.js';
+import { fileName, rangeIgnored, tooLong } from './http-errors.js';
 import { type FetchedPiece, HttpSource } from './http-source.js';
 
 export interface LoadPorts {
-  readonly createDecoder: () => Promise<PhotoDecoder>;
+  readonly createDecoder: (maxTileBytes?: number) => Promise<PhotoDecoder>;
   readonly fetch: typeof fetch;
   /** Milliseconds, from any start. */
   readonly now: () => number;
@@ -18,8 +17,8 @@ export interface LoadPorts {
   readonly yieldToPage: () => Promise<void>;
 }
 
-/** The first request. It contains the index of most files, and small files as a whole. */
-const FIRST_RANGE: ByteRange = { start: 0, end: 1 << 14 };
+/** Length of the first request. It contains the index of most files, and small files as a whole. */
+const FIRST_BYTES = 1 << 14;
 const MIN_PREVIEW_INTERVAL_MS = 400;
 
 /**
@@ -27,20 +26,28 @@ const MIN_PREVIEW_INTERVAL_MS = 400;
  * if it is aborted; nothing remains allocated then.
  */
 export async function openPhoto(url: string, options: LoadOptions, ports: LoadPorts) {
+  const openFrom = async (ports: LoadPorts) => {
+    const photograph = await open(url, options, ports);
+    const quiet = { onProgress: () => {}, onPreview: null, onWaiting: () => {} };
+    photograph.openShard = (shard, signal) => open(url, { ...quiet, signal }, ports, shard);
+    return photograph;
+  };
   try {
-    return await open(url, options, ports);
+    return await openFrom(ports);
   } catch (thrown) {
     if (!hasCode(thrown, 'http-changed')) throw thrown;
     // A cache may still have parts of the old file.
     const reload: typeof fetch = (input, init) => ports.fetch(input, { ...init, cache: 'reload' });
-    return await open(url, options, { ...ports, fetch: reload });
+    return await openFrom({ ...ports, fetch: reload });
   }
 }
 
+/** Opens a shard, or the file, of which this is the last level. */
 async function open(
   url: string,
   options: LoadOptions,
   ports: LoadPorts,
+  shard?: ShardRequest,
 ): Promise<LoadedPhotograph> {
   const { signal, onWaiting } = options;
   signal.throwIfAborted();
@@ -48,9 +55,11 @@ async function open(
   onWaiting(true);
   try {
     const source = new HttpSource(url, { fetch: ports.fetch });
-    const firstPieces = source.read(FIRST_RANGE, stop.signal);
+    const start = shard?.bytes.start ?? 0;
+    const end = Math.min(start + FIRST_BYTES, shard?.bytes.end ?? Number.POSITIVE_INFINITY);
+    const firstPieces = source.read({ start, end }, stop.signal);
     // The decoder starts while the server answers.
-    const starting = ports.createDecoder();
+    const starting = ports.createDecoder(shard?.maxTileBytes);
     stop.signal.addEventListener('abort', () => {
       starting.then((decoder) => decoder.free()).catch(() => {});
     });
@@ -58,7 +67,7 @@ async function open(
       withTimeout(starting, { signal: stop.signal }),
       firstPieces.next().finally(() => onWaiting(false)),
     ]);
-    const pieces = piecesFor(decoder, source, first, firstPieces, stop.signal);
+    const pieces = piecesFor(decoder, source, first, firstPieces, stop.signal, shard);
     return await decodePieces(decoder, reportWaits(pieces, onWaiting), options, ports);
   } catch (thrown) {
     signal.throwIfAborted();
@@ -82,20 +91,35 @@ async function* piecesFor(
   first: IteratorResult<FetchedPiece, void>,
   firstPieces: AsyncIterable<FetchedPiece>,
   signal: AbortSignal,
+  shard: ShardRequest | undefined,
 ): AsyncGenerator<FetchedPiece, void> {
-  if (!first.done) yield first.value;
-  yield* firstPieces;
+  const start = shard?.bytes.start ?? 0;
+  const inShard = ({ offset, bytes }: FetchedPiece): FetchedPiece => {
+    // The server sends the whole file.
+    if (offset < start) throw rangeIgnored(source.url);
+    return { offset: offset - start, bytes };
+  };
+  if (!first.done) yield inShard(first.value);
+  for await (const piece of firstPieces) {
+    yield inShard(piece);
+    const { bytesOfLevels, fileBytes, next } = decoder.state;
+    // The finer levels are fetched when they are seen.
+    if (bytesOfLevels !== fileBytes && !next) return;
+  }
   let lastBytesFed = -1;
   for (;;) {
-    const { fileBytes: end, next, bytesFed } = decoder.state;
+    const { bytesOfLevels: end, next, bytesFed } = decoder.state;
     const { size } = source;
-    if (end !== undefined && size !== undefined && size > end) throw tooLong(source.url, end, size);
+    if (!shard && end !== undefined && size !== undefined && size > end) {
+      throw tooLong(source.url, end, size);
+    }
     if (!next) return;
     // Otherwise the loop would never end.
     if (bytesFed === lastBytesFed)
       throw new Error('the decoder asks for bytes that it already has');
     lastBytesFed = bytesFed;
-    yield* source.read(next, signal);
+    const range = { start: start + next.start, end: start + next.end };
+    for await (const piece of source.read(range, signal)) yield inShard(piece);
   }
 }
 

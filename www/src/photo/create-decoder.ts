@@ -12,8 +12,9 @@ const workers = new DecodeWorkers(() =>
   ),
 );
 
-export async function createDecoder(): Promise<PhotoDecoder> {
-  const decoder = await workers.createDecoder().catch(() => null);
+/** With `maxTileBytes`, the photograph has the first components only, as far as their tiles take no more memory. */
+export async function createDecoder(maxTileBytes?: number): Promise<PhotoDecoder> {
+  const decoder = await workers.createDecoder(maxTileBytes).catch(() => null);
   if (decoder) return decoder;
   // If the module cannot start at all, the page's attempt reports why.
   const [module, { createMainThreadDecoder }] = await Promise.all([
@@ -22,5 +23,5 @@ export async function createDecoder(): Promise<PhotoDecoder> {
       throw missingScript('worker-unavailable', 'decoding without a worker', cause);
     }),
   ]);
-  return createMainThreadDecoder(module, () => performance.now());
+  return createMainThreadDecoder(module, () => performance.now(), maxTileBytes);
 }

@@ -19,7 +19,7 @@ function answer(
   try {
     if (task.kind === 'open') {
       decoder?.free();
-      decoder = new Decoder();
+      decoder = new Decoder(undefined, task.maxTileBytes);
       return { state: decoderState(decoder) };
     }
     if (!decoder) throw new Error('No file was opened.');
@@ -29,8 +29,9 @@ function answer(
     }
     const current = decoder;
     if (task.kind === 'finish') decoder = null;
+    const levels = current.levels();
     const photo = task.kind === 'finish' ? current.finish() : current.preview();
-    return { photo: photo ? takeOut(photo) : null, memoryBytes: memory.buffer.byteLength };
+    return { photo: photo ? takeOut(photo, levels) : null, memoryBytes: memory.buffer.byteLength };
   } catch (thrown) {
     const { code, message } = toPhotoError(thrown);
     return { error: { code, message } };

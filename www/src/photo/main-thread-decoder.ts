@@ -13,8 +13,9 @@ const YIELD_INTERVAL_MS = 8;
 export function createMainThreadDecoder(
   { Decoder }: Pick<DecoderModule, 'Decoder'>,
   now: () => number,
+  maxTileBytes?: number,
 ): PhotoDecoder {
-  const decoder = new Decoder();
+  const decoder = new Decoder(undefined, maxTileBytes);
   let hasEnded = false;
   let lastYieldMs = now();
   return {
@@ -31,13 +32,13 @@ export function createMainThreadDecoder(
     },
     async preview() {
       const photo = decoder.preview();
-      return photo
-        ? LoadedPhotograph.fromModule(photo, completenessOf(decoderState(decoder)))
-        : null;
+      const completeness = completenessOf(decoderState(decoder));
+      return photo ? LoadedPhotograph.fromModule(photo, decoder.levels(), completeness) : null;
     },
     async finish() {
       hasEnded = true;
-      return LoadedPhotograph.fromModule(decoder.finish());
+      const levels = decoder.levels();
+      return LoadedPhotograph.fromModule(decoder.finish(), levels);
     },
     free() {
       if (!hasEnded) decoder.free();
@@ -50,6 +51,6 @@ export function createMainThreadDecoder(
 export function decoderState(decoder: Decoder): DecoderProgress {
   const [start = 0, end] = decoder.wants();
   const next = end === undefined ? undefined : { start, end };
-  const { bytesFed, fileBytes, scansDone } = decoder;
-  return { bytesFed, fileBytes, scansDone, next };
+  const { bytesFed, fileBytes, bytesOfLevels, scansDone } = decoder;
+  return { bytesFed, fileBytes, bytesOfLevels, scansDone, next };
 }

@@ -4,7 +4,8 @@ import type { Decoder } from '../engine/wasm-exports.js';
 import type { ByteRange } from '../shared/value-types.js';
 import type { LoadedPhotograph } from './photograph.js';
 
-export interface DecoderProgress extends Pick<Decoder, 'bytesFed' | 'fileBytes' | 'scansDone'> {
+export interface DecoderProgress
+  extends Pick<Decoder, 'bytesFed' | 'fileBytes' | 'bytesOfLevels' | 'scansDone'> {
   /** The range to feed next; `undefined` once the file is complete. */
   readonly next: ByteRange | undefined;
 }

@@ -37,6 +37,7 @@ export function fakePhoto(tileCount: number) {
         tiles.add(index);
         tilesInModules.add(index);
       },
+      behind: (x: number, y: number) => Float64Array.of(x, y),
       free: () => {
         assert.ok(!isFreed);
         isFreed = true;

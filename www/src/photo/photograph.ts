@@ -12,7 +12,7 @@ import type {
 } from '../engine/wasm-exports.js';
 import { messageOf, PhotoError, photoReleased } from '../shared/errors.js';
 import { allSettledOrThrow } from '../shared/promises.js';
-import type { ColorMatrix, PhotoInfo } from '../shared/value-types.js';
+import type { ByteRange, ColorMatrix, PhotoInfo } from '../shared/value-types.js';
 import { parseColorMatrix, parseMetadata } from './metadata.js';
 import {
   describePhoto,
@@ -34,6 +34,14 @@ interface ModuleTiles {
 /** 'in transit': sent to a worker, or requested from it. */
 type TileLocation = ModuleTiles | 'workers' | 'in transit' | TransferredTile;
 
+/** A part of a finer level. */
+export interface ShardRequest {
+  /** Its bytes in the file. */
+  readonly bytes: ByteRange;
+  /** It has the first components only, as far as their tiles take no more memory. */
+  readonly maxTileBytes: number;
+}
+
 export class LoadedPhotograph implements Freeable {
   readonly info: PhotoInfo;
   readonly colorMatrix: ColorMatrix;
@@ -42,6 +50,11 @@ export class LoadedPhotograph implements Freeable {
   /** One, unless a move has failed halfway. */
   readonly #stores = new Set<ModuleTiles>();
   #session: TilesInWorkers | null = null;
+  /** Opens a shard of its finer levels; `null` if there are none. */
+  openShard: ((shard: ShardRequest, signal: AbortSignal) => Promise<LoadedPhotograph>) | null =
+    null;
+  /** For a shard: the photograph of the last level, and how many times as many light elements this level has a side. */
+  root: { readonly photograph: LoadedPhotograph; readonly scale: number } | null = null;
   /** Why the photograph is unusable: tiles are lost, or it was freed. */
   #fault: PhotoError | null = null;
   /** Settles after the last use that was requested. */
@@ -53,20 +66,30 @@ export class LoadedPhotograph implements Freeable {
     tiles: TransferredTile[],
     readonly completeness = 1,
   ) {
-    const { width, height, lightWidth, lightHeight, decodedBytes } = descriptor;
+    const { decodedBytes, levels } = descriptor;
+    const [
+      width = descriptor.width,
+      height = descriptor.height,
+      lightWidth = descriptor.lightWidth,
+      lightHeight = descriptor.lightHeight,
+    ] = levels;
     const metadata = parseMetadata(descriptor.metadata);
     const { color_matrix } = metadata;
+    this.info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
     this.hasColorMatrix = color_matrix !== undefined;
     this.colorMatrix = parseColorMatrix(color_matrix);
-    this.info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
     this.#tiles = tiles;
   }
 
   /** A photograph in the memory of the page's decoder, which is freed with it or if this throws `format-invalid`. */
-  static fromModule(photo: DecodedPhoto, completeness = 1): LoadedPhotograph {
+  static fromModule(
+    photo: DecodedPhoto,
+    levels?: Float64Array,
+    completeness = 1,
+  ): LoadedPhotograph {
     const store: ModuleTiles = { module: null, photo, onLeave: new Set() };
     try {
-      const descriptor = describePhoto(photo);
+      const descriptor = describePhoto(photo, levels);
       const photograph = new LoadedPhotograph(descriptor, [], completeness);
       photograph.#tiles = Array.from({ length: descriptor.tiles }, () => store);
       photograph.#stores.add(store);

@@ -11,6 +11,8 @@ export interface PhotoDescriptor
   extends Omit<DecodedPhoto, 'takeTile' | 'packGeometry' | 'packBasis' | 'free'> {
   readonly geometry: Float64Array;
   readonly basis: Float32Array;
+  /** As `Decoder.levels` gives them. */
+  readonly levels: Float64Array;
 }
 
 /** A photograph on its way from a worker to the page. */
@@ -25,20 +27,23 @@ export interface PhotographSource {
   load(options: { readonly signal: AbortSignal }): Promise<TransferredPhoto>;
 }
 
+/** Those of a photograph of one level. */
+const NO_LEVELS: Float64Array = new Float64Array();
+
 /** Moves a photograph out of a module's memory. */
-export function takeOut(photo: DecodedPhoto): TransferredPhoto {
-  const descriptor = describePhoto(photo);
+export function takeOut(photo: DecodedPhoto, levels = NO_LEVELS): TransferredPhoto {
+  const descriptor = describePhoto(photo, levels);
   const takeTile = (_: unknown, index: number) => photo.takeTile(index) as TransferredTile;
   const tiles = Array.from({ length: descriptor.tiles }, takeTile);
   photo.free();
   return { descriptor, tiles };
 }
 
-export function describePhoto(photo: DecodedPhoto): PhotoDescriptor {
+export function describePhoto(photo: DecodedPhoto, levels = NO_LEVELS): PhotoDescriptor {
   const { width, height, lightWidth, lightHeight, decodedBytes, metadata, tiles, tileSide } = photo;
   const [geometry, basis] = [photo.packGeometry(), photo.packBasis()];
   const info = { width, height, lightWidth, lightHeight, decodedBytes, metadata };
-  return { ...info, tiles, tileSide, geometry, basis };
+  return { ...info, tiles, tileSide, geometry, basis, levels };
 }
 
 /** One photograph's tiles in workers. */

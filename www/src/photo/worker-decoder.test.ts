@@ -15,6 +15,7 @@ const LIMITS = { intervalMs: 1, maxChecks: 3, maxStartChecks: 1000 };
 const stateAt = (bytesFed: number): DecoderProgress => ({
   bytesFed,
   fileBytes: 900,
+  bytesOfLevels: 900,
   scansDone: 0,
   next: undefined,
 });
@@ -70,6 +71,7 @@ function photoWith(...tileLengths: number[]) {
     tileSide: 1,
     geometry: new Float64Array(12),
     basis: new Float32Array(9),
+    levels: new Float64Array(),
     metadata: '{}',
     decodedBytes: 700,
   };

@@ -10,7 +10,7 @@ import type { TransferredPhoto } from './types.js';
 export type DecodeTask =
   | { readonly kind: 'feed'; readonly offset: number; readonly bytes: Uint8Array }
   /** Starts a file. */
-  | { readonly kind: 'open' }
+  | { readonly kind: 'open'; readonly maxTileBytes: number | undefined }
   | { readonly kind: 'preview' | 'finish' };
 
 export type DecodeResult =
@@ -43,11 +43,12 @@ export class DecodeWorkers {
   ) {}
 
   /** Gives a decoder once its worker has started; `null` if the page may have none. Rejects with `worker-unavailable`. */
-  async createDecoder(): Promise<PhotoDecoder | null> {
+  async createDecoder(maxTileBytes?: number): Promise<PhotoDecoder | null> {
     const client = this.#takeIdle() ?? this.#startClient();
     if (!client) return null;
     await client.ready;
-    return await openDecoder(client, (memoryBytes) => this.#keep(client, memoryBytes));
+    const keep = (memoryBytes: number) => this.#keep(client, memoryBytes);
+    return await openDecoder(client, maxTileBytes, keep);
   }
 
   #takeIdle(): DecodeClient | null {
@@ -76,6 +77,7 @@ export class DecodeWorkers {
 /** `onFinished` gets the worker back; after a failure, and if it is freed early, the worker ends instead. */
 async function openDecoder(
   client: DecodeClient,
+  maxTileBytes: number | undefined,
   onFinished: (memoryBytes: number) => void,
 ): Promise<PhotoDecoder> {
   let hasEnded = false;
@@ -96,7 +98,13 @@ async function openDecoder(
     }
   };
   /** The state after the last task. */
-  let state: DecoderProgress = { bytesFed: 0, fileBytes: undefined, scansDone: 0, next: undefined };
+  let state: DecoderProgress = {
+    bytesFed: 0,
+    fileBytes: undefined,
+    bytesOfLevels: undefined,
+    scansDone: 0,
+    next: undefined,
+  };
   const requestState = async (task: DecodeTask): Promise<void> => {
     const result = await request(task);
     if ('state' in result) state = result.state;
@@ -116,7 +124,7 @@ async function openDecoder(
     }
     throw new PhotoError('internal', 'The decoding worker sent no complete photograph.');
   };
-  await requestState({ kind: 'open' });
+  await requestState({ kind: 'open', maxTileBytes });
   return {
     get state() {
       return state;

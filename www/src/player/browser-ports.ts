@@ -7,6 +7,7 @@ import { PhotoLibrary } from '../photo/photo-library.js';
 import { LoadedPhotograph } from '../photo/photograph.js';
 import { createRenderer, prepare } from '../renderers/renderer-factory.js';
 import { withPolicyErrors } from '../shared/content-security-policy.js';
+import { missingScript } from '../shared/errors.js';
 import { callLater } from '../shared/promises.js';
 import type { SessionPorts } from './types.js';
 
@@ -30,7 +31,19 @@ const library = new PhotoLibrary(async ({ src, credentials }, options) => {
 
 export const BROWSER_PORTS: SessionPorts = {
   library,
-  createRenderer,
+  async createRenderer(backend, photograph, options, onLost, signal) {
+    const root = await createRenderer(backend, photograph, options, onLost, signal);
+    if (photograph.descriptor.levels.length === 0 || !photograph.isComplete) return root;
+    try {
+      const { createLeveledRenderer } = await import('../levels/leveled-renderer.js');
+      return createLeveledRenderer(root, photograph, (shard, onLost, signal) =>
+        createRenderer(backend, shard, options, onLost, signal),
+      );
+    } catch (cause) {
+      console.warn(missingScript('levels-unavailable', 'finer levels', cause).message);
+      return root;
+    }
+  },
   prepare: (options, signal) => void prepare(options, signal),
   copyCanvas,
   nextFrame: (callback) => requestAnimationFrame(callback),

@@ -164,7 +164,7 @@ export class PhotoSession {
       // The canvas of a graphics device keeps its picture only until the script ends.
       try {
         void renderer.render(settings.light, settings.output, 1);
-        this.listener.rendererChanged({ ...renderer, canvas: this.ports.copyCanvas(renderer) });
+        this.listener.rendererChanged({ canvas: this.ports.copyCanvas(renderer) });
       } catch {
         return;
       }

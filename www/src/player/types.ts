@@ -46,7 +46,7 @@ export interface PhotoSessionListener {
   loadStarted(): void;
   progress: LoadOptions['onProgress'];
   /** A new renderer has drawn its first frame: its canvas replaces the last one. */
-  rendererChanged(renderer: Renderer): void;
+  rendererChanged(renderer: Pick<Renderer, 'canvas' | 'layer'>): void;
   /** A frame was drawn; `light` is the light that was requested for it. */
   frameDrawn(frame: AppliedLightStatus, light: LightSetting): void;
   /** That frame has another quality than the last one. The first frame is compared with 1. */

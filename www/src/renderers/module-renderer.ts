@@ -30,8 +30,8 @@ export function createModuleRenderer(
     render(setting, output, quality) {
       const transform = createOutputTransform(module, output, photograph.colorMatrix, gamut);
       try {
-        // The device downsamples an image as it is; that of a photograph with a colour matrix is converted.
-        if (!photograph.hasColorMatrix && upload(relighter, setting.image)) {
+        // The device downsamples an image as it is: not for a part of the light plane, or other colours.
+        if (!photograph.hasColorMatrix && !photograph.root && upload(relighter, setting.image)) {
           hasUploadedImage = true;
           relighter.renderLightImage(transform, quality);
           return { lightApplied: true, lightError: null };

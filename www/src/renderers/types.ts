@@ -28,13 +28,19 @@ export interface Renderer extends Freeable {
   /**
    * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the last promise has
    * settled. If the light is unavailable, the last available one is used and `AppliedLightStatus` has the error. Throws or
-   * rejects with `backend-lost`, or with `photo-lost` if parts of the photograph are lost.
+   * rejects with `backend-lost`, or with `photo-lost` if parts of the photograph are lost. A renderer that computes in
+   * workers shows the frame once `ready` has settled.
    */
   render(
     light: LightSetting,
     output: OutputSettings,
     quality: number,
+    ready?: () => Promise<void>,
   ): AppliedLightStatus | Promise<AppliedLightStatus>;
+  /** Lies over the canvas: finer parts of the picture. It fires `LayerChangeEvent`. */
+  readonly layer?: HTMLElement;
+  /** The picture with its finer parts, for photographs of several levels. Call it directly after `render`. */
+  snapshot?(maxSide: number): HTMLCanvasElement;
 }
 
 /**

@@ -140,6 +140,12 @@ export interface ScriptFaults {
    */
   'input-unavailable': true;
   /**
+   * The script for photographs of several levels could not be loaded.
+   * @visitor the coarsest level of the picture.
+   * @remedy Copy the whole `dist` folder, and do not rename its files: the scripts load each other by name.
+   */
+  'levels-unavailable': true;
+  /**
    * The decoder's worker stopped, mostly because memory ran out.
    * @visitor a message while the photograph loads.
    * @remedy Close other tabs. Make a smaller file with `ltm-export recover --max-bytes`, or with fewer camera

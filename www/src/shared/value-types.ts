@@ -39,7 +39,7 @@ export function clampToPicture({ x, y }: PicturePoint): PicturePoint {
   return { x: clampAndRound(x, 0, 1), y: clampAndRound(y, 0, 1) };
 }
 
-/** The nearest value in a range, with four decimals: far finer than a pixel, and short in share links. */
-export function clampAndRound(value: number, min: number, max: number): number {
-  return Math.round(Math.min(max, Math.max(min, value)) * 1e4) / 1e4;
+/** The nearest value in a range, with four decimals: far finer than most pixels, and short in share links. */
+export function clampAndRound(value: number, min: number, max: number, steps = 1e4): number {
+  return Math.round(Math.min(max, Math.max(min, value)) * steps) / steps;
 }

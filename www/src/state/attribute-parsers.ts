@@ -20,8 +20,8 @@ const LIGHT_SIZE_HINT = 'it is a fraction of the light’s shorter side';
 /** The WebAssembly modules use this radius when none is given. */
 export const DEFAULT_TORCH_SIZE = 1 / 7;
 const MAX_ZOOM = 100;
-/** The meaning of `zoom` without a value. */
-const EMPTY_ZOOM = 8;
+/** The meaning of `zoom` without a value, but for very large pictures. */
+export const EMPTY_ZOOM = 8;
 const MAX_SIZE_PIXELS = 1e6;
 /** One day. Browser timers overflow after some weeks. */
 const MAX_KIOSK_SECONDS = 86_400;
@@ -55,10 +55,10 @@ export const PARSERS = {
     if (names.length === 0) return null;
     return [...new Set(names.map((name) => parseName(name, BACKENDS, 'backend')))];
   },
-  /** The largest magnification; 1 disables zooming. */
+  /** The largest magnification; 1 disables zooming, and `null` leaves it to the picture. */
   zoom: (text: AttributeText) =>
     text?.trim() === ''
-      ? EMPTY_ZOOM
+      ? null
       : (parseNumber(text, 'zoom', 1, MAX_ZOOM, '1 disables zooming') ?? 1),
   /** Seconds without input before the element resets itself; 0 is never. */
   kiosk: (text: AttributeText) =>

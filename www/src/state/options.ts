@@ -3,7 +3,11 @@
 import { parseLightColor } from '../lights/light-color.js';
 import { reuse } from '../shared/reuse-if-equal.js';
 import { CENTRE, type PicturePoint } from '../shared/value-types.js';
+import { EMPTY_ZOOM } from './attribute-parsers.js';
 import type { AttributeReader } from './attribute-reader.js';
+
+/** A pixel of the picture can fill one of a screen where the box of the picture has at least so many. */
+const MIN_BOX_PIXELS = 1024;
 
 /** As `PARSERS` gives them. Addresses are absolute; an absent address is `null`. */
 export type ElementOptions = Readonly<ReturnType<typeof readAttributes>>;
@@ -11,15 +15,22 @@ export type ElementOptions = Readonly<ReturnType<typeof readAttributes>>;
 /** The light before a visitor or a script chooses another. */
 export type LightAttributes = Readonly<ReturnType<typeof readLight>>;
 
-/** Reads all attributes. Objects whose fields are unchanged are taken from `last`. */
-export function readOptions(reader: AttributeReader, last: ElementOptions | null): ElementOptions {
-  const options = readAttributes(reader);
+/**
+ * Reads all attributes. Objects whose fields are unchanged are taken from `last`. `side` is the longer one of the
+ * picture, in pixels; 0 if it is not known.
+ */
+export function readOptions(
+  reader: AttributeReader,
+  last: ElementOptions | null,
+  side = 0,
+): ElementOptions {
+  const options = readAttributes(reader, side);
   const torch = options.light.torch && reuse(last?.light.torch, options.light.torch);
   const light = reuse(last?.light, { ...options.light, torch });
   return reuse(last, { ...options, light });
 }
 
-function readAttributes(reader: AttributeReader) {
+function readAttributes(reader: AttributeReader, side: number) {
   return {
     light: readLight(reader),
     backends: reader.read('backend'),
@@ -34,7 +45,7 @@ function readAttributes(reader: AttributeReader) {
     loading: reader.read('loading'),
     reveal: reader.read('reveal'),
     controls: reader.has('controls'),
-    maxZoom: reader.read('zoom'),
+    maxZoom: reader.read('zoom') ?? Math.max(EMPTY_ZOOM, side / MIN_BOX_PIXELS),
     cooperativeGestures: reader.has('cooperative-gestures'),
     autoplayLight: reader.has('autoplay-light'),
     kioskSeconds: reader.read('kiosk'),

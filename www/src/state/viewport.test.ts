@@ -9,6 +9,7 @@ import {
   toggleZoom,
   toPicture,
   toViewport,
+  viewOf,
   wheelFactor,
   type ZoomView,
   zoomAt,
@@ -73,6 +74,19 @@ test('a panned picture follows the pointer', () => {
   const after = toPicture(pan(CLOSE, 0.1, -0.1), { x: 0.6, y: 0.4 });
   near(after.x, before.x);
   near(after.y, before.y);
+});
+
+test('a part of the picture is shown as large as possible', () => {
+  assert.deepEqual(viewOf({ x: 0.5, y: 0.25, width: 0.25, height: 0.125 }), {
+    zoom: 4,
+    x: 0.625,
+    y: 0.3125,
+  });
+});
+
+test('far into a large picture, views are finer than its pixels', () => {
+  const { x } = clampView({ zoom: 16, x: 0.4 + 1 / 65536, y: 0.5 }, 16);
+  assert.ok(Math.abs(x - 0.4 - 1 / 65536) < 1e-6);
 });
 
 test('a double tap zooms in at its point, and out again', () => {

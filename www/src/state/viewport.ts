@@ -14,11 +14,21 @@ export interface ZoomView {
   readonly y: number;
 }
 
+/** A part of the picture: its top left corner and its size, as fractions of the picture. */
+export interface PictureRect {
+  readonly x: number;
+  readonly y: number;
+  readonly width: number;
+  readonly height: number;
+}
+
 /** Where the viewport is on the page. */
 export type Box = Pick<DOMRectReadOnly, 'left' | 'top' | 'width' | 'height'>;
 
 export const FULL_VIEW: ZoomView = { zoom: 1, ...CENTRE };
 const DOUBLE_TAP_ZOOM = 2.5;
+/** From here on, views are of very large pictures. */
+const FINE_ZOOM = 8;
 export const ZOOM_STEP = 1.5;
 const WHEEL_PIXELS_PER_DOUBLING = 240;
 /** A coarse wheel turns in large steps; limit one event. */
@@ -26,10 +36,17 @@ const MAX_WHEEL_PIXELS = 120;
 /** The height of a line, for wheels that count lines. */
 const WHEEL_LINE_PIXELS = 40;
 
+/** The view that shows a part of the picture, as large as possible. */
+export function viewOf({ x = 0, y = 0, width, height = width }: PictureRect): ZoomView {
+  return { zoom: 1 / Math.max(width, height), x: x + width / 2, y: y + height / 2 };
+}
+
 /** The nearest view inside the picture, with a magnification of at most `maxZoom`. */
 export function clampView({ zoom, x, y }: ZoomView, maxZoom: number): ZoomView {
   const edge = 0.5 / Math.min(maxZoom, Math.max(1, zoom));
-  const clampCentre = (value: number) => clampAndRound(value, edge, 1 - edge);
+  // Four decimals may be more than a pixel of what is shown.
+  const steps = zoom > FINE_ZOOM ? 1e6 : 1e4;
+  const clampCentre = (value: number) => clampAndRound(value, edge, 1 - edge, steps);
   return { zoom: clampAndRound(zoom, 1, maxZoom), x: clampCentre(x), y: clampCentre(y) };
 }
 

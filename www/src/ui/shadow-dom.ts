@@ -43,7 +43,9 @@ export class ShadowDom {
     { class: 'reveal', part: 'button', type: 'button', hidden: '' },
     createElement('span', { class: 'panel' }, createIcon(LIGHT_ICON), this.#revealText),
   );
-  readonly #picture = createElement('div', { part: 'picture' });
+  /** What is moved and magnified. */
+  readonly content = createElement('div', { class: 'content' });
+  readonly #picture = createElement('div', { part: 'picture' }, this.content);
   readonly #posterImage = createElement('img', { part: 'poster', alt: '', hidden: '' });
   readonly #poster = createElement('div', { class: 'poster' });
   readonly contentBox = createElement('div', { class: 'content-box' });
@@ -143,12 +145,13 @@ export class ShadowDom {
     if (hasHandle && focused === viewport) handle.focus({ preventScroll: true });
   }
 
-  showCanvas(canvas: HTMLCanvasElement): void {
+  /** `layer` lies over the canvas; `size` is the picture's. */
+  showCanvas(canvas: HTMLCanvasElement, layer: HTMLElement | undefined, size: Size): void {
     canvas.setAttribute('part', 'canvas');
     this.#canvas = canvas;
-    this.#picture.replaceChildren(canvas);
+    this.content.replaceChildren(canvas, ...(layer ? [layer] : []));
     this.viewport.classList.add('has-picture');
-    this.#pictureSize = { width: canvas.width, height: canvas.height };
+    this.#pictureSize = size;
     this.#updateSpacer();
   }
 
@@ -175,7 +178,7 @@ export class ShadowDom {
   clear(): void {
     this.viewport.classList.remove('has-picture');
     this.#canvas = null;
-    this.#picture.replaceChildren();
+    this.content.replaceChildren();
     this.updateProgress(null);
     this.showError(null);
   }
@@ -185,11 +188,9 @@ export class ShadowDom {
     const { zoom } = view;
     this.viewport.classList.toggle('zoomed', zoom > 1);
     const shift = (centre: number) => `${100 * (0.5 - centre * zoom)}%`;
-    if (this.#canvas) {
-      this.#canvas.style.transform =
-        zoom > 1 ? `translate(${shift(view.x)}, ${shift(view.y)}) scale(${zoom})` : '';
-      this.#canvas.classList.toggle('pixelated', zoom > MIN_PIXELATED_ZOOM);
-    }
+    this.content.style.transform =
+      zoom > 1 ? `translate(${shift(view.x)}, ${shift(view.y)}) scale(${zoom})` : '';
+    this.content.classList.toggle('pixelated', zoom > MIN_PIXELATED_ZOOM);
     const { x, y } = toViewport(view, torch);
     const percent = (coordinate: number) => `${100 * Math.min(1, Math.max(0, coordinate))}%`;
     const { style } = this.#overlay;

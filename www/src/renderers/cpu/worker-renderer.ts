@@ -16,8 +16,8 @@ export async function createWorkerRenderer(
   requestedGamut: Gamut,
 ): Promise<Renderer> {
   const canvas = document.createElement('canvas');
-  canvas.width = photograph.info.width;
-  canvas.height = photograph.info.height;
+  canvas.width = photograph.descriptor.width;
+  canvas.height = photograph.descriptor.height;
   // Keeps the canvas in the page's memory: a software renderer would copy every frame twice.
   const context = canvas.getContext('2d', { colorSpace: requestedGamut, willReadFrequently: true });
   if (!context) {
@@ -40,7 +40,7 @@ export async function createWorkerRenderer(
     kernel,
     gamut,
     qualityController: new QualityController(),
-    async render(setting, output, quality) {
+    async render(setting, output, quality, ready) {
       checkNotFreed();
       try {
         return await photograph.withWorkers(pool, async (session) => {
@@ -48,6 +48,7 @@ export async function createWorkerRenderer(
           const { light, ...result } = lights.get(setting);
           const settings = { output, colorMatrix, gamut, quality };
           const picture = await session.relight(light, settings);
+          await ready?.();
           checkNotFreed();
           // All rows in one task, before the next frame reuses their memory.
           for (const { firstRow, rows, pixels } of picture) {

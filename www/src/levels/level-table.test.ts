@@ -1,0 +1,38 @@
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { LevelTable } from './level-table.js';
+
+/** 1500 x 900 pixels in three levels with shards of 512: six and two of them, and the root. */
+const SHARDS = [
+  [1, 0, 0],
+  [1, 1, 0],
+  [0, 0, 0],
+  [0, 1, 0],
+  [0, 0, 1],
+  [0, 1, 1],
+  [0, 2, 0],
+  [0, 2, 1],
+].flatMap((shard, i) => [...shard, 100 * i, 100 * i + 100]);
+const TABLE = new LevelTable(Float64Array.from([1500, 900, 750, 450, 3, 512, ...SHARDS]));
+
+test('the shards of a level are those with pixels of the part', () => {
+  const all = { left: 0, top: 0, right: 1500, bottom: 900 };
+  assert.equal(TABLE.shardsIn(0, all).length, 6);
+  assert.equal(TABLE.shardsIn(1, all).length, 2);
+  assert.deepEqual(TABLE.shardsIn(2, all), [], 'the root is no shard');
+  const part = { left: 511.5, top: 600, right: 1024, bottom: 601 };
+  assert.deepEqual(TABLE.shardsIn(0, part), [
+    { level: 0, x: 0, y: 1 },
+    { level: 0, x: 1, y: 1 },
+  ]);
+  assert.deepEqual(TABLE.shardsIn(1, part), [{ level: 1, x: 0, y: 0 }]);
+  const beside = { left: -500, top: 2000, right: -1, bottom: 3000 };
+  assert.deepEqual(TABLE.shardsIn(0, beside), []);
+});
+
+test('a shard has its bytes, and its pixels on level 0', () => {
+  assert.deepEqual(TABLE.bytesOf({ level: 0, x: 2, y: 1 }), { start: 700, end: 800 });
+  assert.deepEqual(TABLE.bytesOf({ level: 1, x: 1, y: 0 }), { start: 100, end: 200 });
+  const rect = { left: 1024, top: 0, right: 2048, bottom: 1024 };
+  assert.deepEqual(TABLE.rectOf({ level: 1, x: 1, y: 0 }), rect);
+});

@@ -1,0 +1,79 @@
+/** The levels of a photograph, and their shards: which pixels each has, and which bytes of the file. */
+
+import type { ByteRange } from '../shared/value-types.js';
+
+/** A square part of a level. Level 0 is the finest. */
+export interface ShardId {
+  readonly level: number;
+  /** Column and row, in shards. */
+  readonly x: number;
+  readonly y: number;
+}
+
+/** A part of the picture, in pixels of level 0. */
+export interface PixelRect {
+  readonly left: number;
+  readonly top: number;
+  readonly right: number;
+  readonly bottom: number;
+}
+
+/** The numbers before those of the shards, and those of each shard. */
+const FIXED_NUMBERS = 6;
+const SHARD_NUMBERS = 5;
+
+export class LevelTable {
+  /** Of level 0, in pixels. */
+  readonly width: number;
+  readonly height: number;
+  /** Number of levels. The last, the root, is a photograph by itself. */
+  readonly levels: number;
+  /** In pixels. */
+  readonly shardSide: number;
+  readonly #bytes = new Map<string, ByteRange>();
+
+  /** `numbers` are those of `Decoder.levels`. */
+  constructor(numbers: Float64Array) {
+    const [width = 1, height = 1, , , levels = 1, shardSide = 1] = numbers;
+    this.width = width;
+    this.height = height;
+    this.levels = levels;
+    this.shardSide = shardSide;
+    for (let at = FIXED_NUMBERS; at < numbers.length; at += SHARD_NUMBERS) {
+      const [level = 0, x = 0, y = 0, start = 0, end = 0] = numbers.subarray(
+        at,
+        at + SHARD_NUMBERS,
+      );
+      this.#bytes.set(keyOf({ level, x, y }), { start, end });
+    }
+  }
+
+  /** The shards of a level, other than the root's, with pixels of `rect`, row by row. */
+  shardsIn(level: number, { left, top, right, bottom }: PixelRect): ShardId[] {
+    if (level >= this.levels - 1) return [];
+    const side = this.shardSide * 2 ** level;
+    const range = (start: number, end: number, pixels: number) => {
+      const first = Math.max(0, Math.floor(start / side));
+      const length = Math.max(0, Math.ceil(Math.min(end, pixels) / side) - first);
+      return Array.from({ length }, (_, i) => first + i);
+    };
+    const columns = range(left, right, this.width);
+    return range(top, bottom, this.height).flatMap((y) => columns.map((x) => ({ level, x, y })));
+  }
+
+  /** Its pixels, on level 0. */
+  rectOf({ level, x, y }: ShardId): PixelRect {
+    const side = this.shardSide * 2 ** level;
+    const [left, top] = [x * side, y * side];
+    return { left, top, right: left + side, bottom: top + side };
+  }
+
+  /** Its bytes in the file. */
+  bytesOf(shard: ShardId): ByteRange {
+    return this.#bytes.get(keyOf(shard)) as ByteRange;
+  }
+}
+
+export function keyOf({ level, x, y }: ShardId): string {
+  return `${level} ${x} ${y}`;
+}

@@ -1,0 +1,39 @@
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { type CachedShard, ShardCache } from './shard-cache.js';
+
+/** A cache of 100 bytes, shards of 40, and the names of those that were freed. */
+function createCache() {
+  const evicted: string[] = [];
+  const cache = new ShardCache(100);
+  const add = (name: string): CachedShard => {
+    const shard = { bytes: 40, evict: () => void evicted.push(name) };
+    cache.add(shard);
+    return shard;
+  };
+  return { cache, add, evicted };
+}
+
+test('the least recently seen go first', () => {
+  const { cache, add, evicted } = createCache();
+  const [a, b] = [add('a'), add('b')];
+  cache.show('element', new Set([b]));
+  cache.show('element', new Set([a]));
+  const c = add('c');
+  cache.show('element', new Set([c]));
+  assert.deepEqual(evicted, ['b']);
+});
+
+test('what any element shows stays', () => {
+  const { cache, add, evicted } = createCache();
+  const [a, b] = [add('a'), add('b')];
+  cache.show('one', new Set([a, b]));
+  const c = add('c');
+  cache.show('other', new Set([c]));
+  assert.deepEqual(evicted, []);
+  cache.delete(a);
+  cache.remove('one');
+  const d = add('d');
+  cache.show('other', new Set([c, d]));
+  assert.deepEqual(evicted, ['b']);
+});

@@ -1,0 +1,62 @@
+/** The shards in memory, of all elements of the page. Beyond a limit, those that were not seen for longest are freed. */
+
+/** A shard in memory. */
+export interface CachedShard {
+  /** Memory that it takes: its tiles, and what drawing them needs. */
+  readonly bytes: number;
+  /** Frees it and has its owner forget it. */
+  evict(): void;
+}
+
+const MAX_BYTES = 160 * 2 ** 20;
+const MAX_BYTES_PER_GIB = 40 * 2 ** 20;
+
+/** The device's memory in GiB is known in some browsers, up to 8. */
+function defaultMaxBytes(): number {
+  const { deviceMemory = 8 } = (globalThis.navigator ?? {}) as { readonly deviceMemory?: number };
+  return Math.min(MAX_BYTES, deviceMemory * MAX_BYTES_PER_GIB);
+}
+
+export class ShardCache {
+  /** The least recently seen first. */
+  readonly #shards = new Set<CachedShard>();
+  /** Those that an element shows. */
+  readonly #shown = new Map<unknown, ReadonlySet<CachedShard>>();
+
+  constructor(readonly maxBytes = defaultMaxBytes()) {}
+
+  add(shard: CachedShard): void {
+    this.#shards.add(shard);
+  }
+
+  /** `owner` shows these, and no others. */
+  show(owner: unknown, shards: ReadonlySet<CachedShard>): void {
+    this.#shown.set(owner, shards);
+    for (const shard of shards) {
+      this.#shards.delete(shard);
+      this.#shards.add(shard);
+    }
+    this.#makeRoom();
+  }
+
+  delete(shard: CachedShard): void {
+    this.#shards.delete(shard);
+  }
+
+  /** `owner` is gone, with its shards. */
+  remove(owner: unknown): void {
+    this.#shown.delete(owner);
+  }
+
+  #makeRoom(): void {
+    let excess = -this.maxBytes;
+    for (const { bytes } of this.#shards) excess += bytes;
+    for (const shard of [...this.#shards]) {
+      if (excess <= 0) return;
+      if ([...this.#shown.values()].some((shown) => shown.has(shard))) continue;
+      excess -= shard.bytes;
+      this.#shards.delete(shard);
+      shard.evict();
+    }
+  }
+}

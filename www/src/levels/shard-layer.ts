@@ -1,0 +1,136 @@
+/** The canvases of shards over that of the root, which they follow when it is moved, magnified or resized. */
+
+import type { Gamut } from '../engine/wasm-exports.js';
+import type { PhotoError } from '../shared/errors.js';
+import type { LevelTable, PixelRect } from './level-table.js';
+import type { PictureView } from './shard-selection.js';
+
+/** A shard that is drawn. */
+export interface PlacedShard {
+  readonly id: { readonly level: number };
+  readonly rect: PixelRect;
+  readonly canvas: HTMLCanvasElement | null;
+}
+
+/** Bubbles from the layer: a shard has arrived or the view has changed, so that a frame is due; or an error is to be reported. */
+export type LayerChangeEvent = CustomEvent<PhotoError | null>;
+
+export class ShardLayer {
+  /** Lies over the root's canvas, in the box of the picture, which is moved and magnified. */
+  readonly element = document.createElement('div');
+  /** Its pixels are those of level 0. */
+  readonly #plane = document.createElement('div');
+  readonly #resizes: ResizeObserver;
+  readonly #moves: MutationObserver;
+
+  /** `canvas` is that of the root. */
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly table: LevelTable,
+  ) {
+    const { element } = this;
+    const scale = 2 ** (table.levels - 1);
+    // The root's last column and row may reach beyond the picture.
+    canvas.style.width = `${(100 * canvas.width * scale) / table.width}%`;
+    canvas.style.height = `${(100 * canvas.height * scale) / table.height}%`;
+    Object.assign(element.style, { position: 'absolute', inset: '0', transformOrigin: '0 0' });
+    element.style.pointerEvents = 'none';
+    Object.assign(this.#plane.style, { position: 'absolute', transformOrigin: '0 0' });
+    element.append(this.#plane);
+    // Its pixels are coarser than those of the picture.
+    canvas.style.imageRendering = 'auto';
+    this.#resizes = new ResizeObserver(() => this.#follow());
+    this.#resizes.observe(element);
+    this.#moves = new MutationObserver(() => this.requestFrame());
+  }
+
+  /** What is visible of the picture; `null` if nothing is. */
+  view(): PictureView | null {
+    const { element, table } = this;
+    const picture = element.getBoundingClientRect();
+    const box = element.parentElement?.parentElement?.getBoundingClientRect();
+    if (!box || picture.width === 0 || picture.height === 0) return null;
+    const [across, down] = [table.width / picture.width, table.height / picture.height];
+    const left = (Math.max(box.left, 0) - picture.left) * across;
+    const top = (Math.max(box.top, 0) - picture.top) * down;
+    const right = (Math.min(box.right, innerWidth) - picture.left) * across;
+    const bottom = (Math.min(box.bottom, innerHeight) - picture.top) * down;
+    if (left >= right || top >= bottom) return null;
+    const scale = devicePixelRatio / Math.min(across, down);
+    return { rect: { left, top, right, bottom }, scale };
+  }
+
+  /** Shows these, and no others. */
+  show(shards: Iterable<PlacedShard>): void {
+    const shown = new Set<Node>();
+    for (const { id, rect, canvas } of shards) {
+      if (!canvas) continue;
+      shown.add(canvas);
+      if (canvas.parentNode === this.#plane) continue;
+      const side = 2 ** id.level;
+      Object.assign(canvas.style, {
+        position: 'absolute',
+        left: `${rect.left}px`,
+        top: `${rect.top}px`,
+        width: `${canvas.width * side}px`,
+        height: `${canvas.height * side}px`,
+        // Finer ones lie over coarser ones.
+        zIndex: String(-id.level),
+      });
+      this.#plane.append(canvas);
+    }
+    for (const canvas of [...this.#plane.childNodes]) if (!shown.has(canvas)) canvas.remove();
+  }
+
+  requestFrame(): void {
+    this.#dispatch(null);
+  }
+
+  report(error: PhotoError): void {
+    this.#dispatch(error);
+  }
+
+  /** The whole picture in the resolution of the finest of `shards`, with sides of at most `maxSide`. */
+  snapshot(shards: Iterable<PlacedShard>, gamut: Gamut, maxSide: number): HTMLCanvasElement {
+    const sorted = [...shards].sort((a, b) => b.id.level - a.id.level);
+    const finest = sorted.at(-1)?.id.level;
+    const { canvas, table } = this;
+    const { width, height } = table;
+    const root = 2 ** (table.levels - 1);
+    const wanted = 1 / (finest === undefined ? root : 2 ** finest);
+    const factor = Math.min(wanted, maxSide / Math.max(width, height));
+    const copy = document.createElement('canvas');
+    copy.width = Math.max(1, Math.round(width * factor));
+    copy.height = Math.max(1, Math.round(height * factor));
+    const context = copy.getContext('2d', { colorSpace: gamut });
+    const scale = root * factor;
+    context?.drawImage(canvas, 0, 0, canvas.width * scale, canvas.height * scale);
+    for (const { id, rect, canvas: part } of sorted) {
+      if (!part) continue;
+      const side = 2 ** id.level * factor;
+      const [left, top] = [rect.left * factor, rect.top * factor];
+      context?.drawImage(part, left, top, part.width * side, part.height * side);
+    }
+    return copy;
+  }
+
+  free(): void {
+    this.#resizes.disconnect();
+    this.#moves.disconnect();
+    this.element.remove();
+  }
+
+  /** Fits into the box of the picture, and follows it. */
+  #follow(): void {
+    const { element, table } = this;
+    const { offsetWidth, offsetHeight, parentElement } = element;
+    const scale = `${offsetWidth / table.width}, ${offsetHeight / table.height}`;
+    this.#plane.style.transform = `scale(${scale})`;
+    if (parentElement) this.#moves.observe(parentElement, { attributeFilter: ['style'] });
+    this.requestFrame();
+  }
+
+  #dispatch(detail: PhotoError | null): void {
+    this.element.dispatchEvent(new CustomEvent('change', { bubbles: true, detail }));
+  }
+}

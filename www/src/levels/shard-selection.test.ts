@@ -1,0 +1,49 @@
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { keyOf, LevelTable, type ShardId } from './level-table.js';
+import { selectShards } from './shard-selection.js';
+
+/** 16384 x 16384 pixels in six levels with shards of 512. */
+const TABLE = new LevelTable(Float64Array.of(16384, 16384, 8192, 8192, 6, 512));
+const NONE = () => false;
+const ALL = () => true;
+
+function view(left: number, top: number, pixels: number, scale: number) {
+  return { rect: { left, top, right: left + pixels, bottom: top + pixels }, scale };
+}
+
+test('the level has about one pixel for each device pixel', () => {
+  const level = (scale: number) => selectShards(TABLE, view(0, 0, 800, scale), ALL).level;
+  assert.deepEqual([4, 1, 0.75, 0.6, 0.5, 0.3, 0.01].map(level), [0, 0, 0, 1, 1, 2, 5]);
+});
+
+test('a coarser level comes first, and then the shards from the middle outwards', () => {
+  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), NONE);
+  const [first, second, ...others] = needed;
+  assert.deepEqual(first, { level: 2, x: 0, y: 0 });
+  assert.deepEqual(second, { level: 0, x: 1, y: 1 });
+  assert.equal(others.length, 8);
+  assert.equal(isComplete, false);
+  const corners = others.slice(4).map(({ x, y }) => x !== 1 && y !== 1);
+  assert.deepEqual(corners, [true, true, true, true]);
+});
+
+test('once all shards are there, no coarser one is needed', () => {
+  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), ALL);
+  assert.equal(needed.length, 9);
+  assert.equal(isComplete, true);
+});
+
+test('two levels before the root, nothing comes first', () => {
+  const { needed } = selectShards(TABLE, view(0, 0, 16384, 1 / 8), NONE);
+  assert.deepEqual(new Set(needed.map(({ level }) => level)), new Set([3]));
+  assert.deepEqual(selectShards(TABLE, view(0, 0, 16384, 1 / 64), NONE).needed, []);
+});
+
+test('a screen with more pixels than shards may have gets a coarser level', () => {
+  const { level, needed } = selectShards(TABLE, view(0, 0, 8192, 1), NONE);
+  assert.equal(level, 2);
+  const finest = (shards: readonly ShardId[]) => shards.filter((shard) => shard.level === level);
+  assert.equal(finest(needed).length, 16);
+  assert.equal(new Set(needed.map(keyOf)).size, needed.length);
+});

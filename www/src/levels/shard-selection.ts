@@ -1,0 +1,58 @@
+/** Which shards a view needs, and which of those in memory it shows. */
+
+import type { LevelTable, PixelRect, ShardId } from './level-table.js';
+
+/** What is visible of a picture. */
+export interface PictureView {
+  readonly rect: PixelRect;
+  /** Device pixels along the side of a pixel of level 0. */
+  readonly scale: number;
+}
+
+export interface ShardSelection {
+  /** The level that the view should have; that of the root if it suffices. */
+  readonly level: number;
+  /** The shards to load, the most urgent first. Some of them may be in memory. */
+  readonly needed: readonly ShardId[];
+  /** Whether all shards of the level are in memory. */
+  readonly isComplete: boolean;
+}
+
+/** Coarser by this many levels comes first: a sixteenth of the bytes. */
+const COARSE_STEPS = 2;
+/** Maximum number of shards of a view; a screen with more pixels gets a coarser level. */
+const MAX_SHARDS = 40;
+
+export function selectShards(
+  table: LevelTable,
+  { rect, scale }: PictureView,
+  isLoaded: (shard: ShardId) => boolean,
+): ShardSelection {
+  const root = table.levels - 1;
+  // Between 0.7 and 1.4 pixels of the level for a device pixel.
+  let level = Math.min(root, Math.max(0, Math.round(-Math.log2(scale))));
+  let shards = table.shardsIn(level, rect);
+  while (shards.length > MAX_SHARDS) {
+    level += 1;
+    shards = table.shardsIn(level, rect);
+  }
+  const isComplete = shards.every(isLoaded);
+  const coarse = isComplete ? [] : table.shardsIn(level + COARSE_STEPS, rect);
+  const needed = [...coarse, ...nearestFirst(table, shards, rect)];
+  return { level, needed, isComplete };
+}
+
+/** Whether two parts of the picture have pixels in common. */
+export function overlap(a: PixelRect, b: PixelRect): boolean {
+  return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+}
+
+function nearestFirst(table: LevelTable, shards: readonly ShardId[], view: PixelRect) {
+  const centre = ({ left, top, right, bottom }: PixelRect) => [left + right, top + bottom];
+  const [x = 0, y = 0] = centre(view);
+  const distance = (shard: ShardId) => {
+    const [u = 0, v = 0] = centre(table.rectOf(shard));
+    return Math.hypot(u - x, v - y);
+  };
+  return [...shards].sort((a, b) => distance(a) - distance(b));
+}
