@@ -5,6 +5,7 @@
 //!   level 0. The peak is the brightest pixel of that average.
 //! - `large_*`: a photograph of 4096 x 4096 pixels (`DEEPZOOM_SIDE` for another multiple of 512), copies of the first scene
 //!   side by side: microseconds of `encode` for a pixel, its peak memory, and bytes over those of one level.
+//!   `benches/page/levels.js` then shows it in a page.
 
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed benchmark should panic
 
@@ -170,8 +171,8 @@ fn large(folder: &Path, scene: &Path, figures: &mut Figures) {
         1e-6 * number("peak_rss_bytes"),
     );
     figures.insert("large_pyramid_over_flat".to_owned(), number("size_ratio"));
+    // The page's part of the benchmark shows the other.
     fs::remove_file(flat).unwrap();
-    fs::remove_file(file).unwrap();
 }
 
 /// Writes `count` times `count` copies of a square file as one.

@@ -513,6 +513,50 @@ fn only_visible_tiles_are_wanted() {
     assert!(visible_part.tiles[20].is_dark() && !whole.tiles[20].is_dark());
 }
 
+/// For viewers with little memory.
+#[test]
+fn a_limited_reader_has_the_first_components_and_wants_no_others() {
+    let mixed = Recovered::mixed(small_geometry(), 12, 3);
+    let mut factored = Recovered::mixed(small_geometry(), 12, 4);
+    for tile in factored.tiles.iter_mut().step_by(2) {
+        *tile = FloatTile::dark(tile.rect);
+    }
+    for (recovered, has_fewer_scans) in [(mixed, false), (factored, true)] {
+        let file = recovered.file(EncodingTarget::Snr(Decibels(35.0)));
+        let (whole, _) = decode(&file, file.len()).unwrap();
+        let mut reader = LtmReader::new(Limits::default());
+        reader.limit_tiles(1);
+        let mut fed = 0;
+        while let Some(range) = reader.wants(&ChunkSelection::default()).first() {
+            let end = file.len().min(range.end as usize);
+            let bytes = &file[range.start as usize..end];
+            reader.feed(range.start, bytes).unwrap();
+            fed = fed.max(end);
+        }
+        let progress = reader.progress();
+        assert_eq!(progress.tiles, whole.tiles.len());
+        let is_shorter = progress.file_bytes.unwrap() < file.len() as u64;
+        assert_eq!(is_shorter, has_fewer_scans);
+        // A server may send the whole file.
+        reader.feed(fed as u64, &file[fed..]).unwrap();
+        let (part, _) = reader.finish().unwrap();
+        let (rank, of) = (part.basis.rank(), whole.basis.rank());
+        assert_eq!((rank, of), (4, 12));
+        assert_eq!(part.basis.kernels, whole.basis.kernels[..rank]);
+        for (part, whole) in part.tiles.iter().zip(&whole.tiles) {
+            assert_eq!(part.functions, whole.functions);
+            let pixels = 0..part.rect().extent.area();
+            for (p, k) in pixels.flat_map(|p| (0..rank).map(move |k| (p, k))) {
+                let pairs = part.coefficient(rank, p, k).into_iter();
+                for (c, (a, b)) in pairs.zip(whole.coefficient(of, p, k)).enumerate() {
+                    let step = part.coefficients.step[c].max(whole.coefficients.step[c]);
+                    assert!((a - b).abs() <= 1.01 * step, "{a}, not {b}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn dark_tiles_take_no_bytes() {
     let geometry = geometry(

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::checksum::check_crc;
 use super::chunk::{ChunkEntry, ChunkId};
 use super::codec::zstd_frame::{compress, decompress};
-use super::constants::HEADER_BYTES;
+use super::constants::{HEADER_BYTES, MAX_RANK};
 use super::directory;
 use super::displacement;
 use super::error::{FormatError, SectionName};
@@ -14,13 +14,10 @@ use super::header::{Header, SectionEntry};
 #[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
 use super::levels::ShardPlace;
 use super::memory_budget::MemoryBudget;
-#[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
 use super::memory_estimate;
 use super::metadata::MetadataText;
 use super::scan::{ProgressiveScan, ScanCoding, rank_of};
-use crate::transport::Geometry;
-#[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
-use crate::transport::{Decibels, TEXEL_COMPONENTS};
+use crate::transport::{Geometry, TEXEL_COMPONENTS};
 
 /// Everything that precedes the first scan.
 #[derive(Clone, Debug)]
@@ -102,22 +99,33 @@ impl FileIndex {
         self.has_extension(TABLE_TAG)
     }
 
-    /// The largest number of components, in fours, whose coefficients take at most `bytes` in memory; at least four.
-    #[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
-    pub fn rank_within(&self, bytes: u64) -> usize {
+    /// Leaves out the scans after the last that has any of the first components whose coefficients, in fours, take at most
+    /// `bytes` in memory; at least four. Returns their number, or `None` if all are read or the file is lossless.
+    pub(super) fn limit_components(&mut self, bytes: u64) -> Option<usize> {
         let four = memory_estimate::coefficient_bytes(&self.header, TEXEL_COMPONENTS);
-        TEXEL_COMPONENTS
-            * usize::try_from(bytes / four.max(1))
-                .unwrap_or(usize::MAX / 8)
-                .max(1)
-    }
-
-    /// The SNR after the last scan that has any of the first `rank` components.
-    #[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
-    pub fn snr_of_rank(&self, rank: usize) -> Option<Decibels> {
-        let mut scans = self.scans.iter().rev();
-        let last = scans.find(|scan| scan.coding.is_direct() || usize::from(scan.first) < rank);
-        last.map(|scan| scan.snr)
+        let fours = usize::try_from(bytes / four.max(1)).unwrap_or(usize::MAX);
+        let rank = fours.clamp(1, MAX_RANK.into()) * TEXEL_COMPONENTS;
+        let is_lossless = self
+            .scans
+            .iter()
+            .any(|scan| scan.coding == ScanCoding::Halves);
+        if is_lossless || rank >= usize::from(self.header.rank) {
+            return None;
+        }
+        let is_needed =
+            |scan: &ProgressiveScan| scan.coding.is_direct() || usize::from(scan.first) < rank;
+        let scans = self
+            .scans
+            .iter()
+            .rposition(is_needed)
+            .map_or(0, |last| last + 1);
+        let tiles = self.tiles();
+        self.scans.truncate(scans);
+        self.entries.truncate(scans * tiles);
+        self.offsets.truncate(scans * (tiles + 1) + 1);
+        self.header.rank = rank_of(&self.scans) as u16; // not larger than before
+        self.header.file_bytes = self.offsets[self.offsets.len() - 1];
+        Some(rank)
     }
 
     pub(super) fn has_extension(&self, tag: [u8; 4]) -> bool {

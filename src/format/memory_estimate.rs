@@ -44,7 +44,6 @@ pub(super) fn index_bytes(header: &Header) -> u64 {
 }
 
 /// Bytes that the coefficients of all tiles take, over a basis of `rank` functions.
-#[cfg(any(not(target_arch = "wasm32"), feature = "decoder"))]
 pub(super) fn coefficient_bytes(header: &Header, rank: usize) -> u64 {
     let tiles = header.geometry.tiles();
     let texels = tiles.map(|rect| Tile::texels(rect, rank) as u64);

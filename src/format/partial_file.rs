@@ -31,6 +31,8 @@ pub struct ChunkSelection {
 #[derive(Debug)]
 pub(super) struct PartialFile {
     index: FileIndex,
+    /// Number of components that are read, if not all.
+    max_components: Option<usize>,
     /// Functions whose chunk has not come are zero.
     basis: Basis,
     /// The centre-out order of slots.
@@ -67,7 +69,11 @@ enum TileState {
 }
 
 impl PartialFile {
-    pub fn new(index: FileIndex, budget: &MemoryBudget) -> Result<Self, FormatError> {
+    pub fn new(
+        index: FileIndex,
+        max_components: Option<usize>,
+        budget: &MemoryBudget,
+    ) -> Result<Self, FormatError> {
         let (tiles, scans) = (index.tiles(), index.scans.len());
         let mut state = Self {
             basis: Basis {
@@ -79,9 +85,10 @@ impl PartialFile {
             missing: budget.try_zeroed(scans)?,
             undecodable: None,
             received_bytes: 0,
+            max_components,
             index,
         };
-        let partial = |tile| TileState::Partial(TileDecoder::new(tile));
+        let partial = |tile| TileState::Partial(TileDecoder::new(tile, max_components));
         state.tiles.extend((0..tiles).map(partial));
         let empty = || ChunkState::Decoded;
         state.chunks.resize_with(scans * (tiles + 1), empty);
@@ -94,6 +101,12 @@ impl PartialFile {
             state.advance_tile(tile, budget)?;
         }
         Ok(state)
+    }
+
+    /// Number of components of complete tiles.
+    fn rank(&self) -> usize {
+        let rank = self.basis.rank();
+        self.max_components.map_or(rank, |most| most.min(rank))
     }
 
     pub fn index(&self) -> &FileIndex {
@@ -178,13 +191,30 @@ impl PartialFile {
             bytes = bytes.get(known..).unwrap_or_default();
             offset = index_bytes;
         }
-        while !bytes.is_empty() {
-            if offset >= end {
-                return match self.index.has_levels() {
-                    true => Ok(()), // the other levels
-                    false => Err(FormatError::TrailingBytes(end)),
-                };
+        let last = end.min(offset + bytes.len() as u64);
+        if offset < last {
+            let scans = [offset, last - 1].map(|at| self.index.chunk_at(at).scan);
+            match scans[0] == scans[1] {
+                true => self.feed_scan(offset, &bytes[..(last - offset) as usize], budget)?,
+                false => self.feed_scans(scans[0]..scans[1] + 1, offset..last, bytes, budget)?,
             }
+        }
+        // The other levels, or components.
+        let may_continue = self.index.has_levels() || self.max_components.is_some();
+        match offset + bytes.len() as u64 <= end.max(offset) || may_continue {
+            true => Ok(()),
+            false => Err(FormatError::TrailingBytes(end)),
+        }
+    }
+
+    /// Takes bytes of one scan.
+    fn feed_scan(
+        &mut self,
+        mut offset: u64,
+        mut bytes: &[u8],
+        budget: &MemoryBudget,
+    ) -> Result<(), FormatError> {
+        while !bytes.is_empty() {
             let chunk = self.index.chunk_at(offset);
             let range = self.index.range(chunk);
             let here = bytes.len().min((range.end - offset) as usize); // a chunk is below 4 GiB
@@ -192,6 +222,29 @@ impl PartialFile {
             self.feed_chunk(chunk, range, offset, now, budget)?;
             offset += here as u64;
             bytes = later;
+        }
+        Ok(())
+    }
+
+    /// Takes bytes of several scans tile by tile, so that only one that becomes complete is in memory as decoded values.
+    fn feed_scans(
+        &mut self,
+        scans: Range<usize>,
+        fed: Range<u64>,
+        bytes: &[u8],
+        budget: &MemoryBudget,
+    ) -> Result<(), FormatError> {
+        let tiles = (0..self.index.tiles()).map(Some);
+        for tile in std::iter::once(None).chain(tiles) {
+            for scan in scans.clone() {
+                let chunk = ChunkId { scan, tile };
+                let range = self.index.range(chunk);
+                let (start, end) = (range.start.max(fed.start), range.end.min(fed.end));
+                if start < end {
+                    let [from, to] = [start, end].map(|at| (at - fed.start) as usize);
+                    self.feed_chunk(chunk, range, start, &bytes[from..to], budget)?;
+                }
+            }
         }
         Ok(())
     }
@@ -304,10 +357,11 @@ impl PartialFile {
     /// Skips scans that have no chunk for the tile, decodes chunks that waited, and turns the tile into codes
     /// after its last scan.
     fn advance_tile(&mut self, tile: usize, budget: &MemoryBudget) -> Result<(), FormatError> {
+        let rank = self.rank();
         while let TileState::Partial(decoder) = &mut self.tiles[tile] {
             let scan = decoder.scans;
             if scan == self.index.scans.len() {
-                let quantised = decoder.quantise(&self.index, self.basis.rank(), budget)?;
+                let quantised = decoder.quantise(&self.index, rank, budget)?;
                 budget.release(decoder.bytes());
                 self.tiles[tile] = TileState::Complete(quantised);
                 break;
@@ -341,21 +395,12 @@ impl PartialFile {
             return Ok(None);
         }
         let _scratch = budget.scratch();
-        match self.transport(self.index.new_basis_functions(scans - 1).end, budget) {
+        let rank = self.index.new_basis_functions(scans - 1).end;
+        match self.transport(rank.min(self.rank()), budget) {
             Ok(transport) => Ok(Some(transport)),
             Err(FormatError::Limit { .. }) => Ok(None),
             Err(error) => Err(error),
         }
-    }
-
-    /// The transport by the first `rank` components of all chunks so far.
-    pub fn components(
-        &self,
-        rank: usize,
-        budget: &MemoryBudget,
-    ) -> Result<(Transport, MetadataText), FormatError> {
-        let transport = self.transport(rank.min(self.basis.rank()), budget)?;
-        Ok((transport, self.index.metadata.clone()))
     }
 
     fn transport(&self, rank: usize, budget: &MemoryBudget) -> Result<Transport, FormatError> {
@@ -392,7 +437,7 @@ impl PartialFile {
         let texels = Tile::texels(tile.rect(), rank);
         let codes = budget.try_with_capacity(coefficients.codes.len().min(texels))?;
         Ok(Tile {
-            coefficients: coefficients.first_components(self.basis.rank(), rank, codes),
+            coefficients: coefficients.first_components(self.rank(), rank, codes),
             functions: FunctionCodes {
                 entries: budget.try_copy(&functions.entries)?,
                 ..*functions
@@ -402,7 +447,7 @@ impl PartialFile {
 
     /// The transport of all chunks so far.
     pub fn finish(self, budget: &MemoryBudget) -> Result<(Transport, MetadataText), FormatError> {
-        let rank = self.basis.rank();
+        let rank = self.rank();
         let mut tiles = budget.try_with_capacity(self.tiles.len())?;
         for (i, tile) in self.tiles.into_iter().enumerate() {
             tiles.push(match tile {
@@ -415,9 +460,11 @@ impl PartialFile {
                 }
             });
         }
+        let mut basis = self.basis;
+        basis.kernels.truncate(rank);
         let transport = Transport {
             geometry: self.index.header.geometry,
-            basis: self.basis,
+            basis,
             tiles,
         };
         Ok((transport, self.index.metadata))

@@ -55,6 +55,8 @@ pub struct LtmReader {
     state: Option<PartialFile>,
     /// Bytes of the index received.
     received_index_bytes: u64,
+    /// Bytes that the coefficients may take.
+    max_tile_bytes: Option<u64>,
 }
 
 /// How much of a file has been read.
@@ -79,7 +81,14 @@ impl LtmReader {
             header: None,
             state: None,
             received_index_bytes: 0,
+            max_tile_bytes: None,
         }
+    }
+
+    /// Reads the first components only, in fours, as far as their coefficients take at most `bytes` in memory, at least four;
+    /// all of a lossless file. Call it before the first [`feed`](Self::feed).
+    pub fn limit_tiles(&mut self, bytes: u64) {
+        self.max_tile_bytes = Some(bytes);
     }
 
     /// Byte ranges to fetch, the most important first: the index, and then each scan as far as `selection`
@@ -173,9 +182,12 @@ impl LtmReader {
             return self.advance();
         };
         if self.gathered.len() as u64 == header.index_bytes() {
-            let index = FileIndex::decode(header.clone(), &self.gathered, &self.budget)?;
+            let mut index = FileIndex::decode(header.clone(), &self.gathered, &self.budget)?;
+            let limit = self.max_tile_bytes;
+            let max_components = limit.and_then(|bytes| index.limit_components(bytes));
             self.budget.check(memory_estimate::file_bytes(&index))?;
-            self.state = Some(PartialFile::new(index, &self.budget)?);
+            self.header = Some(index.header.clone());
+            self.state = Some(PartialFile::new(index, max_components, &self.budget)?);
             self.budget.release_vec(std::mem::take(&mut self.gathered));
         }
         Ok(())
@@ -217,21 +229,6 @@ impl LtmReader {
         match &self.state {
             Some(state) => state.preview(&self.budget),
             None => Ok(None),
-        }
-    }
-
-    /// The light transport by the first `rank` components, of all chunks received so far.
-    ///
-    /// # Errors
-    /// [`FormatError::Truncated`] if the index is not complete, [`FormatError::DamagedSection`] if a chunk did not decode,
-    /// and the errors of the budget.
-    pub fn finish_components(self, rank: usize) -> Result<(Transport, MetadataText), FormatError> {
-        let Some(state) = &self.state else {
-            return Err(self.truncated());
-        };
-        match state.undecodable() {
-            Some(chunk) => Err(damaged("its values are missing").in_chunk(chunk)),
-            None => state.components(rank, &self.budget),
         }
     }
 

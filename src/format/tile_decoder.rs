@@ -25,9 +25,14 @@ pub(super) struct TileDecoder {
 }
 
 impl TileDecoder {
-    pub fn new(tile: usize) -> Self {
+    /// With `max_components` it reads no more components.
+    pub fn new(tile: usize, max_components: Option<usize>) -> Self {
         Self {
             tile,
+            planes: CoefficientPlanes {
+                max_components,
+                ..CoefficientPlanes::default()
+            },
             ..Self::default()
         }
     }
@@ -161,7 +166,7 @@ pub fn decode_tile<E: From<FormatError>>(
 ) -> Result<FloatTile, E> {
     let budget = MemoryBudget::unlimited();
     let order = direct_functions::centre_out_order(index.header.geometry.window, &budget)?;
-    let mut decoder = TileDecoder::new(tile);
+    let mut decoder = TileDecoder::new(tile, None);
     for scan in 0..index.scans.len() {
         if index.entry(scan, tile).bytes == 0 {
             decoder.scans += 1;
@@ -243,7 +248,7 @@ pub fn check(index: &FileIndex, chunk: ChunkId, bytes: &[u8]) -> Result<(), Form
     }
     let mut decoder = TileDecoder {
         scans: scan,
-        ..TileDecoder::new(tile)
+        ..TileDecoder::new(tile, None)
     };
     if !index.has_colour_klt(scan, tile) {
         decoder.planes = CoefficientPlanes::with_klt();

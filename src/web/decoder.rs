@@ -14,7 +14,6 @@ pub struct Decoder {
     reader: LtmReader,
     /// Of a file of several levels, once its index is read.
     levels: Option<LevelTable>,
-    max_tile_bytes: Option<f64>,
 }
 
 #[wasm_bindgen]
@@ -29,21 +28,20 @@ impl Decoder {
         let limits = max_decoded_bytes.map_or_else(Limits::default, |bytes| Limits {
             decoded_bytes: bytes as u64, // saturates; 0 for NaN
         });
+        let mut reader = LtmReader::new(limits);
+        if let Some(bytes) = max_tile_bytes {
+            reader.limit_tiles(bytes as u64);
+        }
         Self {
-            reader: LtmReader::new(limits),
+            reader,
             levels: None,
-            max_tile_bytes,
         }
     }
 
     /// The missing byte ranges, the most important first: start and end of the first, then of the second, and so on. The
     /// first may end beyond a small file. Empty once the file is complete.
     pub fn wants(&self) -> Vec<f64> {
-        let mut selection = ChunkSelection::default();
-        if let (Some(bytes), Some(index)) = (self.max_tile_bytes, self.reader.index()) {
-            selection.snr = index.snr_of_rank(index.rank_within(bytes as u64));
-        }
-        let ranges = self.reader.wants(&selection).into_iter();
+        let ranges = self.reader.wants(&ChunkSelection::default()).into_iter();
         let bounds = ranges.flat_map(|range| [range.start as f64, range.end as f64]);
         bounds.collect()
     }
@@ -120,18 +118,12 @@ impl Decoder {
         Ok(Some(Photo::with_metadata(transport, metadata)))
     }
 
-    /// The photograph, once nothing is wanted.
+    /// The photograph, once the file is complete.
     ///
     /// # Errors
     /// A code that begins with `format-`: `format-truncated` if the file is not complete.
     pub fn finish(self) -> Result<Photo, CodedError> {
-        let (transport, metadata) = match (self.max_tile_bytes, self.reader.index()) {
-            (Some(bytes), Some(index)) => {
-                let rank = index.rank_within(bytes as u64);
-                self.reader.finish_components(rank)?
-            }
-            _ => self.reader.finish()?,
-        };
+        let (transport, metadata) = self.reader.finish()?;
         Ok(Photo::with_metadata(transport, metadata.text().to_owned()))
     }
 }

@@ -34,6 +34,8 @@ pub type CoefficientPlane = Vec<f32>;
 pub struct CoefficientPlanes {
     pub klt: Option<ColourKlt>,
     pub components: Vec<CoefficientPlane>,
+    /// Number of components that are read, if not all.
+    pub max_components: Option<usize>,
 }
 
 impl CoefficientPlanes {
@@ -41,7 +43,7 @@ impl CoefficientPlanes {
     pub fn with_klt() -> Self {
         Self {
             klt: Some(ColourKlt([[0; CHANNELS]; CHANNELS])),
-            components: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -116,7 +118,10 @@ impl CoefficientPlanes {
         if main.tokens() + side.tokens() < tokens {
             return Err(damaged("it has fewer tokens than its entry says"));
         }
-        let components = usize::from(scan.first)..scan.end();
+        let end = self
+            .max_components
+            .map_or(scan.end(), |most| most.min(scan.end()));
+        let components = usize::from(scan.first).min(end)..end;
         if self.components.len() < components.end {
             let mut grown = budget.try_with_capacity(components.end)?;
             grown.append(&mut self.components);
@@ -136,7 +141,9 @@ impl CoefficientPlanes {
                 }
             }
         }
-        main.finish()?;
+        if end == scan.end() {
+            main.finish()?;
+        }
         for plane in planes {
             for corner in block_corners(extent) {
                 let end = side.read_run(&mut numbers)?;
@@ -157,7 +164,10 @@ impl CoefficientPlanes {
                 numbers[..end].fill(0);
             }
         }
-        side.finish()
+        match end == scan.end() {
+            true => side.finish(),
+            false => Ok(()),
+        }
     }
 }
 

@@ -141,6 +141,7 @@ impl QuantisedCoefficients {
         let mut planes = CoefficientPlanes {
             klt: Some(quantised.klt),
             components: vec![Vec::new()],
+            max_components: None,
         };
         let on_axes = |p: usize| quantised.klt.forward(of(p, 0));
         let mut component: Vec<ColourVector> = (0..pixels).map(on_axes).collect();

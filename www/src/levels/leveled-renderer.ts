@@ -21,6 +21,8 @@ import { overlap, selectShards } from './shard-selection.js';
 const BYTES_PER_PIXEL = 20;
 /** Memory for four more components of a pixel. */
 const QUAD_BYTES = 24;
+/** A view of fewer shards leaves room for others, among them those that are being loaded. */
+const MIN_SHARDS = 3;
 /** A shard is loaded again for more components if it may have so many times as many. */
 const MIN_GAIN = 2;
 
@@ -140,7 +142,8 @@ class LeveledRenderer implements Renderer {
     const isLoaded = (id: ShardId) => this.#shards.has(keyOf(id));
     const selection = selectShards(this.#table, view, isLoaded);
     const { needed } = selection;
-    this.#maxTileBytes = cache.maxBytes / needed.length - this.#pixelBytes;
+    const shards = Math.max(needed.length, MIN_SHARDS);
+    this.#maxTileBytes = cache.maxBytes / shards - this.#pixelBytes;
     const isShown = ({ id, rect }: Shard) =>
       overlap(rect, view.rect) && (id.level === selection.level || !selection.isComplete);
     const shown = new Set([...this.#shards.values()].filter(isShown));
