@@ -7,8 +7,8 @@ use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
 use relightable_photo::format::{
     self, ChunkId, ChunkSelection, DistortionMetric, EncodedFile, EncoderInput, EncodingTarget,
-    FormatError, FormatExtension, HEADER_BYTES, Limits, LtmReader, Metadata, ScanCoding,
-    SectionName, TextModeDamage,
+    FormatError, FormatExtension, HEADER_BYTES, Limits, LtmReader, Metadata, ProgressiveScan,
+    ScanCoding, SectionName, TextModeDamage,
 };
 use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::transport::{
@@ -521,7 +521,7 @@ fn a_limited_reader_has_the_first_components_and_wants_no_others() {
     for tile in factored.tiles.iter_mut().step_by(2) {
         *tile = FloatTile::dark(tile.rect);
     }
-    for (recovered, has_fewer_scans) in [(mixed, false), (factored, true)] {
+    for recovered in [mixed, factored] {
         let file = recovered.file(EncodingTarget::Snr(Decibels(35.0)));
         let (whole, _) = decode(&file, file.len()).unwrap();
         let mut reader = LtmReader::new(Limits::default());
@@ -535,13 +535,15 @@ fn a_limited_reader_has_the_first_components_and_wants_no_others() {
         }
         let progress = reader.progress();
         assert_eq!(progress.tiles, whole.tiles.len());
-        let is_shorter = progress.file_bytes.unwrap() < file.len() as u64;
-        assert_eq!(is_shorter, has_fewer_scans);
+        let index = read(&file, file.len()).unwrap().index().unwrap().clone();
+        let is_needed = |scan: &ProgressiveScan| scan.coding.is_direct() || scan.first < 4;
+        let last = index.scans.iter().rposition(is_needed).unwrap();
+        assert_eq!(progress.file_bytes.unwrap(), index.scan_range(last).end);
         // A server may send the whole file.
         reader.feed(fed as u64, &file[fed..]).unwrap();
         let (part, _) = reader.finish().unwrap();
         let (rank, of) = (part.basis.rank(), whole.basis.rank());
-        assert_eq!((rank, of), (4, 12));
+        assert!(rank == 4 && of > 4, "{rank} of {of}");
         assert_eq!(part.basis.kernels, whole.basis.kernels[..rank]);
         for (part, whole) in part.tiles.iter().zip(&whole.tiles) {
             assert_eq!(part.functions, whole.functions);

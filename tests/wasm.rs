@@ -126,7 +126,7 @@ fn file(transport: &Transport, metadata: &Metadata) -> Vec<u8> {
 }
 
 fn decode(bytes: &[u8], piece: usize) -> Result<Photo, CodedError> {
-    let mut decoder = Decoder::new(None);
+    let mut decoder = Decoder::new(None, None);
     for (i, bytes) in bytes.chunks(piece).enumerate() {
         decoder.feed((i * piece) as f64, bytes)?;
     }
@@ -293,7 +293,7 @@ async fn assert_backend_draws_the_reference(backend: &str) {
                 .collect();
             let values = Float32Array::from(&values[..]);
             let Extent { width, height } = geometry.light;
-            let web_light = WebLight::from_linear(&photo, &values, width, height).unwrap();
+            let web_light = WebLight::from_linear(&photo, &values, width, height, None).unwrap();
             let exposure = [1.0, 0.4, 2.5][j % 3];
             relighter.render(&web_light, exposure).unwrap();
             let want = reference::picture(&transport, &light, &page_output(exposure));
@@ -429,7 +429,7 @@ fn a_file_decodes_in_pieces_of_any_size() {
         );
         assert!(photo.metadata().contains(r#""writer":"test""#));
     }
-    let mut decoder = Decoder::new(None);
+    let mut decoder = Decoder::new(None, None);
     assert_eq!((decoder.bytes_fed(), decoder.file_bytes()), (0.0, None));
     decoder.feed(0.0, &bytes[..500]).unwrap();
     let whole = Some(bytes.len() as f64);
@@ -493,7 +493,7 @@ async fn a_photo_is_transferred_to_another_module_tile_by_tile() {
 fn a_decoder_asks_for_each_byte_once() {
     let transport = relit::asymmetric_transport(geometries()[0].clone(), TileContents::Direct, 0);
     let bytes = file(&transport, &Metadata::default());
-    let mut decoder = Decoder::new(None);
+    let mut decoder = Decoder::new(None, None);
     let mut asked = Vec::new();
     loop {
         let wanted = decoder.wants();
@@ -550,9 +550,9 @@ fn each_kind_of_invalid_file_has_its_code() {
         coded(decode(&[good, b"more"].concat(), 4096)),
         "format-invalid"
     );
-    let limited = Decoder::new(Some(1e5)).feed(0.0, good);
+    let limited = Decoder::new(Some(1e5), None).feed(0.0, good);
     assert_eq!(coded(limited), "format-limit");
-    let gap = Decoder::new(None).feed(1000.0, &good[1000..]);
+    let gap = Decoder::new(None, None).feed(1000.0, &good[1000..]);
     assert_eq!(coded(gap), "format-invalid");
 }
 
@@ -560,7 +560,7 @@ fn each_kind_of_invalid_file_has_its_code() {
 async fn invalid_lights_and_exposures_are_refused() {
     let [one, other] = [0, 1].map(photo);
     let linear = |values: &[f32], width, height| {
-        WebLight::from_linear(&one, &Float32Array::from(values), width, height)
+        WebLight::from_linear(&one, &Float32Array::from(values), width, height, None)
     };
     let srgb =
         |codes: &[u8], width| WebLight::from_srgb(&one, &Uint8ClampedArray::from(codes), width, 1);
