@@ -36,3 +36,16 @@ test('a shard has its bytes, and its pixels on level 0', () => {
   const rect = { left: 1024, top: 0, right: 2048, bottom: 1024 };
   assert.deepEqual(TABLE.rectOf({ level: 1, x: 1, y: 0 }), rect);
 });
+
+test('a photograph of another place is refused as a shard', () => {
+  const shard = { level: 1, x: 1, y: 0 };
+  const geometry = Float64Array.of(238, 450, 100, 99, 15, 32, 512, 0, 200, 0, 375, 225);
+  TABLE.checkPlace(shard, { width: 238, height: 450, geometry });
+  const refused = (width: number, change: number) => {
+    const other = geometry.map((value, i) => (i === change ? value + 1 : value));
+    const check = () => TABLE.checkPlace(shard, { width, height: 450, geometry: other });
+    assert.throws(check, { code: 'format-invalid', message: /shard 1, 0 of level 1/ });
+  };
+  refused(239, -1);
+  for (const change of [6, 7, 10, 11]) refused(238, change);
+});

@@ -1,5 +1,6 @@
 /** The levels of a photograph, and their shards: which pixels each has, and which bytes of the file. */
 
+import { PhotoError } from '../shared/errors.js';
 import type { ByteRange } from '../shared/value-types.js';
 
 /** A square part of a level. Level 0 is the finest. */
@@ -30,11 +31,16 @@ export class LevelTable {
   readonly levels: number;
   /** In pixels. */
   readonly shardSide: number;
+  readonly #lightWidth: number;
+  readonly #lightHeight: number;
   readonly #bytes = new Map<string, ByteRange>();
 
   /** `numbers` are those of `Decoder.levels`. */
   constructor(numbers: Float64Array) {
-    const [width = 1, height = 1, , , levels = 1, shardSide = 1] = numbers;
+    const [width = 1, height = 1, lightWidth = 1, lightHeight = 1, levels = 1, shardSide = 1] =
+      numbers;
+    this.#lightWidth = lightWidth;
+    this.#lightHeight = lightHeight;
     this.width = width;
     this.height = height;
     this.levels = levels;
@@ -66,6 +72,25 @@ export class LevelTable {
     const side = this.shardSide * 2 ** level;
     const [left, top] = [x * side, y * side];
     return { left, top, right: left + side, bottom: top + side };
+  }
+
+  /** Throws `format-invalid` if a photograph is not the shard with this name. `geometry` is as the decoder packs it. */
+  checkPlace(
+    shard: ShardId,
+    { width, height, geometry }: { width: number; height: number; geometry: Float64Array },
+  ): void {
+    const scale = 2 ** shard.level;
+    const levelOf = (side: number) => Math.ceil(side / scale);
+    const [left, top] = [shard.x * this.shardSide, shard.y * this.shardSide];
+    const expected = [
+      Math.min(this.shardSide, levelOf(this.width) - left),
+      Math.min(this.shardSide, levelOf(this.height) - top),
+      ...[left, top, levelOf(this.#lightWidth), levelOf(this.#lightHeight)],
+    ];
+    const found = [width, height, geometry[6], geometry[7], geometry[10], geometry[11]];
+    if (expected.every((value, i) => value === found[i])) return;
+    const message = `The shard ${shard.x}, ${shard.y} of level ${shard.level} belongs at another place. Export the file again.`;
+    throw new PhotoError('format-invalid', message);
   }
 
   /** Its bytes in the file. */

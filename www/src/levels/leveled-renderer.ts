@@ -6,10 +6,12 @@
  */
 
 import type { OutputSettings } from '../engine/output-settings.js';
+import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
 import type { Renderer } from '../renderers/types.js';
-import { toPhotoError } from '../shared/errors.js';
+import { PhotoError, toPhotoError } from '../shared/errors.js';
+import { allSettledOrThrow } from '../shared/promises.js';
 import { FrameBarrier } from './frame-barrier.js';
 import { keyOf, LevelTable, type PixelRect, type ShardId } from './level-table.js';
 import { type CachedShard, ShardCache } from './shard-cache.js';
@@ -22,7 +24,7 @@ const BYTES_PER_PIXEL = 20;
 /** Memory for four more components of a pixel. */
 const QUAD_BYTES = 24;
 /** A view of fewer shards leaves room for others, among them those that are being loaded. */
-const MIN_SHARDS = 3;
+const MIN_SHARDS = 4;
 /** A shard is loaded again for more components if it may have so many times as many. */
 const MIN_GAIN = 2;
 
@@ -61,9 +63,13 @@ class LeveledRenderer implements Renderer {
   readonly #layer: ShardLayer;
   readonly #loader: ShardLoader;
   readonly #shards = new Map<string, Shard>();
-  #shown: ReadonlySet<Shard> = new Set();
-  /** The memory that a shard's tiles may take, if all that the view needs are to fit. */
-  #maxTileBytes = 0;
+  #shown = new Set<Shard>();
+  /** The codes of errors of loads that were reported. */
+  readonly #reported = new Set<string>();
+  /** Replaced by finer ones, and on the screen until these are drawn. */
+  readonly #outgoing = new Set<Shard>();
+  /** How many times four components a shard may have, if all that the view needs are to fit. */
+  #quads = 1;
 
   constructor(
     private readonly root: Renderer,
@@ -76,7 +82,7 @@ class LeveledRenderer implements Renderer {
     this.gamut = gamut;
     this.qualityController = qualityController;
     this.#table = new LevelTable(photograph.descriptor.levels);
-    this.#layer = new ShardLayer(canvas, this.#table);
+    this.#layer = new ShardLayer(canvas, this.#table, () => this.#hide());
     this.layer = this.#layer.element;
     this.#loader = new ShardLoader(
       (shard, signal) => this.#load(shard, signal),
@@ -104,14 +110,20 @@ class LeveledRenderer implements Renderer {
     const status = barrier.pass((ready) => this.root.render(light, output, quality, ready));
     // Not before they are drawn.
     const show = () => {
+      for (const shard of shown) if (shard.isFreed) shown.delete(shard);
+      for (const shard of this.#shown) if (!shown.has(shard)) shard.forget();
       this.#shown = shown;
       this.#layer.show(shown);
+      cache.show(this, shown);
+      // One that was replaced during the frame is shown until the next.
+      for (const shard of this.#outgoing) {
+        if (shown.has(shard)) continue;
+        this.#outgoing.delete(shard);
+        this.#free(shard);
+      }
     };
     if (drawings.length > 0 || status instanceof Promise) {
-      return Promise.all([status, ...drawings]).then(([result]) => {
-        show();
-        return result;
-      });
+      return this.#afterAll(status, drawings, show);
     }
     show();
     return status;
@@ -126,28 +138,47 @@ class LeveledRenderer implements Renderer {
 
   free(): void {
     this.#loader.request([]);
-    for (const shard of [...this.#shards.values()]) this.#free(shard);
+    for (const shard of [...this.#shards.values(), ...this.#outgoing]) this.#free(shard);
     cache.remove(this);
     this.#layer.free();
     this.root.free();
   }
 
+  async #afterAll(
+    status: AppliedLightStatus | Promise<AppliedLightStatus>,
+    drawings: readonly Promise<unknown>[],
+    show: () => void,
+  ): Promise<AppliedLightStatus> {
+    const all = await allSettledOrThrow<unknown>([Promise.resolve(status), ...drawings]);
+    show();
+    return all[0] as AppliedLightStatus;
+  }
+
+  /** Nobody sees the picture: its shards may be freed. */
+  #hide(): void {
+    this.#loader.request([]);
+    cache.show(this, new Set());
+  }
+
   /** Gives the shards of the view that are in memory, and loads the others. */
-  #update(): ReadonlySet<Shard> {
+  #update(): Set<Shard> {
     const view = this.#layer.view();
     if (!view) {
-      this.#loader.request([]);
-      return this.#shown;
+      this.#hide();
+      return new Set();
     }
     const isLoaded = (id: ShardId) => this.#shards.has(keyOf(id));
-    const selection = selectShards(this.#table, view, isLoaded);
+    const { pixels } = this;
+    const maxShards = Math.floor(cache.maxBytes / ((BYTES_PER_PIXEL + QUAD_BYTES) * pixels));
+    const selection = selectShards(this.#table, view, isLoaded, Math.max(maxShards, MIN_SHARDS));
     const { needed } = selection;
-    const shards = Math.max(needed.length, MIN_SHARDS);
-    this.#maxTileBytes = cache.maxBytes / shards - this.#pixelBytes;
+    const bytes = cache.maxBytes / Math.max(needed.length, MIN_SHARDS);
+    this.#quads = Math.max(1, Math.floor((bytes / pixels - BYTES_PER_PIXEL) / QUAD_BYTES));
     const isShown = ({ id, rect }: Shard) =>
       overlap(rect, view.rect) && (id.level === selection.level || !selection.isComplete);
     const shown = new Set([...this.#shards.values()].filter(isShown));
-    cache.show(this, shown);
+    // Those on the screen stay until the others are drawn.
+    cache.show(this, new Set([...this.#shown, ...shown]));
     this.#loader.request(needed.filter((id) => !isLoaded(id) || this.#mayBeFiner(id)));
     return shown;
   }
@@ -155,39 +186,46 @@ class LeveledRenderer implements Renderer {
   async #load(id: ShardId, signal: AbortSignal): Promise<void> {
     const { photograph } = this;
     try {
-      const maxTileBytes = this.#maxTileBytes;
+      const quads = this.#quads;
+      const maxTileBytes = quads * QUAD_BYTES * this.pixels;
       const bytes = this.#table.bytesOf(id);
       const loaded = await photograph.openShard?.({ bytes, maxTileBytes }, signal);
       if (!loaded) return;
       loaded.root = { photograph, scale: 2 ** (this.#table.levels - 1 - id.level) };
-      const rect = this.#table.rectOf(id);
-      const shard = new Shard(id, rect, loaded, maxTileBytes, () => this.#free(shard));
+      const shard = new Shard(id, this.#table.rectOf(id), loaded, quads, () => this.#free(shard));
       try {
+        this.#table.checkPlace(id, loaded.descriptor);
         shard.renderer = await this.createShardRenderer(loaded, () => this.#lose(shard), signal);
         signal.throwIfAborted();
+        if (shard.isFreed) throw new PhotoError('backend-lost', 'Its device was lost at once.');
       } catch (thrown) {
         shard.free();
         throw thrown;
       }
       const coarser = this.#shards.get(keyOf(id));
-      if (coarser) this.#free(coarser);
+      if (coarser) this.#outgoing.add(coarser);
       this.#shards.set(keyOf(id), shard);
       cache.add(shard);
       this.#layer.requestFrame();
     } catch (thrown) {
-      if (!signal.aborted) this.#layer.report(toPhotoError(thrown));
-      throw thrown;
+      const error = toPhotoError(thrown);
+      if (!signal.aborted && !this.#reported.has(error.code)) {
+        this.#reported.add(error.code);
+        this.#layer.report(error);
+      }
+      throw error;
     }
   }
 
-  get #pixelBytes(): number {
-    return BYTES_PER_PIXEL * this.#table.shardSide ** 2;
+  /** Pixels of a shard. */
+  private get pixels(): number {
+    return this.#table.shardSide ** 2;
   }
 
   /** Whether a shard that lacks components would get more of them now. */
   #mayBeFiner(id: ShardId): boolean {
     const shard = this.#shards.get(keyOf(id));
-    return shard?.isLimited === true && shard.maxTileBytes < this.#maxTileBytes / MIN_GAIN;
+    return shard?.isLimited === true && shard.quads * MIN_GAIN <= this.#quads;
   }
 
   /** A shard whose worker or device is gone is loaded again. */
@@ -198,7 +236,9 @@ class LeveledRenderer implements Renderer {
 
   #free(shard: Shard): void {
     cache.delete(shard);
-    this.#shards.delete(keyOf(shard.id));
+    const key = keyOf(shard.id);
+    if (this.#shards.get(key) === shard) this.#shards.delete(key);
+    this.#shown.delete(shard);
     shard.free();
   }
 }
@@ -208,19 +248,22 @@ class Shard implements CachedShard {
   /** Set before it is drawn. */
   renderer: Renderer | null = null;
   #last: Frame | null = null;
+  #isInWorkers = false;
+  isFreed = false;
 
   constructor(
     readonly id: ShardId,
     readonly rect: PixelRect,
     private readonly photograph: LoadedPhotograph,
-    readonly maxTileBytes: number,
+    /** How many times four components it may have. */
+    readonly quads: number,
     readonly evict: () => void,
   ) {}
 
   /** Whether more components may not have fit. */
   get isLimited(): boolean {
     const { width, height, decodedBytes } = this.photograph.info;
-    return decodedBytes + QUAD_BYTES * width * height > this.maxTileBytes;
+    return decodedBytes + QUAD_BYTES * width * height > this.quads * QUAD_BYTES * width * height;
   }
 
   get canvas(): HTMLCanvasElement | null {
@@ -243,19 +286,28 @@ class Shard implements CachedShard {
     return this.#render(frame, ready);
   }
 
-  /** Draws the last frame again. */
+  /** Draws the last frame again, if that is done at once: canvases of the CPU keep their pictures. */
   redraw(): void {
-    if (this.#last) void this.#render(this.#last)?.catch(() => {});
+    if (this.#last && !this.#isInWorkers) this.#render(this.#last);
+  }
+
+  /** Its canvas leaves the page, and may lose its picture. */
+  forget(): void {
+    this.#last = null;
   }
 
   free(): void {
+    if (this.isFreed) return;
+    this.isFreed = true;
     this.renderer?.canvas.remove();
     this.renderer?.free();
     this.photograph.free();
   }
 
   #render({ light, output, quality }: Frame, ready?: () => Promise<void>): Promise<unknown> | null {
+    if (this.isFreed) return null;
     const drawn = this.renderer?.render(light, output, quality, ready);
+    this.#isInWorkers = drawn instanceof Promise;
     return drawn instanceof Promise ? drawn : null;
   }
 }

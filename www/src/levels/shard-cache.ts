@@ -8,8 +8,8 @@ export interface CachedShard {
   evict(): void;
 }
 
-const MAX_BYTES = 128 * 2 ** 20;
-const MAX_BYTES_PER_GIB = 32 * 2 ** 20;
+const MAX_BYTES = 160 * 2 ** 20;
+const MAX_BYTES_PER_GIB = 40 * 2 ** 20;
 
 /** The device's memory in GiB is known in some browsers, up to 8. */
 function defaultMaxBytes(): number {

@@ -5,6 +5,9 @@ import type { PhotoError } from '../shared/errors.js';
 import type { LevelTable, PixelRect } from './level-table.js';
 import type { PictureView } from './shard-selection.js';
 
+/** A change of the visible share of the picture by this part is noticed. */
+const VISIBILITY_STEPS = 20;
+
 /** A shard that is drawn. */
 export interface PlacedShard {
   readonly id: { readonly level: number };
@@ -22,11 +25,14 @@ export class ShardLayer {
   readonly #plane = document.createElement('div');
   readonly #resizes: ResizeObserver;
   readonly #moves: MutationObserver;
+  readonly #visibility: IntersectionObserver;
+  readonly #end = new AbortController();
 
-  /** `canvas` is that of the root. */
+  /** `canvas` is that of the root. `hidden` is called when nothing of the picture is visible. */
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly table: LevelTable,
+    hidden: () => void,
   ) {
     const { element } = this;
     const scale = 2 ** (table.levels - 1);
@@ -39,9 +45,19 @@ export class ShardLayer {
     element.append(this.#plane);
     // Its pixels are coarser than those of the picture.
     canvas.style.imageRendering = 'auto';
-    this.#resizes = new ResizeObserver(() => this.#follow());
+    this.#resizes = new ResizeObserver(([entry]) => {
+      if (entry) this.#follow(entry.contentRect);
+    });
     this.#resizes.observe(element);
     this.#moves = new MutationObserver(() => this.requestFrame());
+    // Also where the page scrolls.
+    const threshold = Array.from({ length: VISIBILITY_STEPS + 1 }, (_, i) => i / VISIBILITY_STEPS);
+    this.#visibility = new IntersectionObserver(
+      (entries) => (entries.at(-1)?.isIntersecting ? this.requestFrame() : hidden()),
+      { threshold },
+    );
+    // Magnifying the page changes the size of its pixels.
+    addEventListener('resize', () => this.requestFrame(), { signal: this.#end.signal });
   }
 
   /** What is visible of the picture; `null` if nothing is. */
@@ -117,16 +133,18 @@ export class ShardLayer {
   free(): void {
     this.#resizes.disconnect();
     this.#moves.disconnect();
+    this.#visibility.disconnect();
+    this.#end.abort();
     this.element.remove();
   }
 
   /** Fits into the box of the picture, and follows it. */
-  #follow(): void {
-    const { element, table } = this;
-    const { offsetWidth, offsetHeight, parentElement } = element;
-    const scale = `${offsetWidth / table.width}, ${offsetHeight / table.height}`;
-    this.#plane.style.transform = `scale(${scale})`;
-    if (parentElement) this.#moves.observe(parentElement, { attributeFilter: ['style'] });
+  #follow({ width, height }: Pick<DOMRectReadOnly, 'width' | 'height'>): void {
+    const { table } = this;
+    const { parentElement: content } = this.element;
+    this.#plane.style.transform = `scale(${width / table.width}, ${height / table.height})`;
+    if (content) this.#moves.observe(content, { attributeFilter: ['style'] });
+    if (content?.parentElement) this.#visibility.observe(content.parentElement);
     this.requestFrame();
   }
 

@@ -58,3 +58,22 @@ test('a shard that failed is tried again later', async () => {
   loader.request([shard(0)]);
   assert.equal(started.length, 2);
 });
+
+test('a shard that is needed again while its load is being cancelled is loaded again', async () => {
+  const started: Deferred[] = [];
+  const loader = new ShardLoader(
+    () => {
+      const end = new Deferred();
+      started.push(end);
+      return end.promise;
+    },
+    () => 0,
+  );
+  loader.request([shard(0)]);
+  loader.request([]);
+  loader.request([shard(0)]);
+  assert.equal(started.length, 1, 'it has not ended yet');
+  started[0]?.reject(new Error('cancelled'));
+  await settled();
+  assert.equal(started.length, 2);
+});

@@ -1,10 +1,12 @@
 /** Loads shards in the order in which a view needs them, a few at a time, and cancels those that it needs no more. */
 
+import { hasCode } from '../shared/errors.js';
+import { callLater } from '../shared/promises.js';
 import { keyOf, type ShardId } from './level-table.js';
 
 /** One is decoded while the next arrives. */
 const MAX_LOADS = 2;
-/** A shard that could not be loaded is tried again after this time. */
+/** A shard that could not be loaded is tried again after this time, unless the server sends no ranges. */
 const RETRY_MS = 15_000;
 
 export class ShardLoader {
@@ -44,11 +46,17 @@ export class ShardLoader {
     try {
       await this.load(shard, abort.signal);
       this.#failures.delete(key);
-    } catch {
-      if (!abort.signal.aborted) this.#failures.set(key, this.now());
+      this.#needed = this.#needed.filter((other) => keyOf(other) !== key);
+    } catch (thrown) {
+      if (!abort.signal.aborted) {
+        this.#failures.set(
+          key,
+          hasCode(thrown, 'http-range') ? Number.POSITIVE_INFINITY : this.now(),
+        );
+        callLater(RETRY_MS, () => this.#startNext());
+      }
     }
     this.#loads.delete(key);
-    this.#needed = this.#needed.filter((other) => keyOf(other) !== key);
     this.#startNext();
   }
 }

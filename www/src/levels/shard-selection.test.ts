@@ -13,12 +13,12 @@ function view(left: number, top: number, pixels: number, scale: number) {
 }
 
 test('the level has about one pixel for each device pixel', () => {
-  const level = (scale: number) => selectShards(TABLE, view(0, 0, 800, scale), ALL).level;
+  const level = (scale: number) => selectShards(TABLE, view(0, 0, 800, scale), ALL, 40).level;
   assert.deepEqual([4, 1, 0.75, 0.6, 0.5, 0.3, 0.01].map(level), [0, 0, 0, 1, 1, 2, 5]);
 });
 
 test('a coarser level comes first, and then the shards from the middle outwards', () => {
-  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), NONE);
+  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), NONE, 40);
   const [first, second, ...others] = needed;
   assert.deepEqual(first, { level: 2, x: 0, y: 0 });
   assert.deepEqual(second, { level: 0, x: 1, y: 1 });
@@ -29,19 +29,19 @@ test('a coarser level comes first, and then the shards from the middle outwards'
 });
 
 test('once all shards are there, no coarser one is needed', () => {
-  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), ALL);
+  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), ALL, 40);
   assert.equal(needed.length, 9);
   assert.equal(isComplete, true);
 });
 
 test('two levels before the root, nothing comes first', () => {
-  const { needed } = selectShards(TABLE, view(0, 0, 16384, 1 / 8), NONE);
+  const { needed } = selectShards(TABLE, view(0, 0, 16384, 1 / 8), NONE, 40);
   assert.deepEqual(new Set(needed.map(({ level }) => level)), new Set([3]));
-  assert.deepEqual(selectShards(TABLE, view(0, 0, 16384, 1 / 64), NONE).needed, []);
+  assert.deepEqual(selectShards(TABLE, view(0, 0, 16384, 1 / 64), NONE, 40).needed, []);
 });
 
 test('a screen with more pixels than shards may have gets a coarser level', () => {
-  const { level, needed } = selectShards(TABLE, view(0, 0, 8192, 1), NONE);
+  const { level, needed } = selectShards(TABLE, view(0, 0, 8192, 1), NONE, 40);
   assert.equal(level, 2);
   const finest = (shards: readonly ShardId[]) => shards.filter((shard) => shard.level === level);
   assert.equal(finest(needed).length, 16);

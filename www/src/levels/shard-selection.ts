@@ -20,19 +20,19 @@ export interface ShardSelection {
 
 /** Coarser by this many levels comes first: a sixteenth of the bytes. */
 const COARSE_STEPS = 2;
-/** Maximum number of shards of a view; a screen with more pixels gets a coarser level. */
-const MAX_SHARDS = 40;
 
+/** A view that needs more than `maxShards` gets a coarser level. */
 export function selectShards(
   table: LevelTable,
   { rect, scale }: PictureView,
   isLoaded: (shard: ShardId) => boolean,
+  maxShards: number,
 ): ShardSelection {
   const root = table.levels - 1;
   // Between 0.7 and 1.4 pixels of the level for a device pixel.
   let level = Math.min(root, Math.max(0, Math.round(-Math.log2(scale))));
   let shards = table.shardsIn(level, rect);
-  while (shards.length > MAX_SHARDS) {
+  while (shards.length > maxShards) {
     level += 1;
     shards = table.shardsIn(level, rect);
   }

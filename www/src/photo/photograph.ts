@@ -50,7 +50,7 @@ export class LoadedPhotograph implements Freeable {
   /** One, unless a move has failed halfway. */
   readonly #stores = new Set<ModuleTiles>();
   #session: TilesInWorkers | null = null;
-  /** Opens a shard of its finer levels; `null` if there are none. */
+  /** Opens a shard of its finer levels, if it has any; `null` if it is no file. */
   openShard: ((shard: ShardRequest, signal: AbortSignal) => Promise<LoadedPhotograph>) | null =
     null;
   /** For a shard: the photograph of the last level, and how many times as many light elements this level has a side. */

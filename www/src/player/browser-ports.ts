@@ -34,15 +34,13 @@ export const BROWSER_PORTS: SessionPorts = {
   async createRenderer(backend, photograph, options, onLost, signal) {
     const root = await createRenderer(backend, photograph, options, onLost, signal);
     if (photograph.descriptor.levels.length === 0 || !photograph.isComplete) return root;
-    try {
-      const { createLeveledRenderer } = await import('../levels/leveled-renderer.js');
-      return createLeveledRenderer(root, photograph, (shard, onLost, signal) =>
-        createRenderer(backend, shard, options, onLost, signal),
-      );
-    } catch (cause) {
+    const levels = await import('../levels/leveled-renderer.js').catch((cause: unknown) => {
       console.warn(missingScript('levels-unavailable', 'finer levels', cause).message);
-      return root;
-    }
+    });
+    if (!levels) return root;
+    return levels.createLeveledRenderer(root, photograph, (shard, onLost, signal) =>
+      createRenderer(backend, shard, options, onLost, signal),
+    );
   },
   prepare: (options, signal) => void prepare(options, signal),
   copyCanvas,

@@ -28,6 +28,8 @@ import type { PhotoSessionListener, SessionPorts, SessionSettings } from './type
 
 /** How often a photograph that loses tiles is fetched again without a frame in between. */
 const MAX_REFETCHES = 5;
+/** Maximum side of the resting picture of a photograph of several levels, in pixels. */
+const MAX_RESTING_SIDE = 1024;
 
 /** What is known of a photograph that was released while its picture stays. */
 interface RestingPicture {
@@ -160,11 +162,12 @@ export class PhotoSession {
     const { settings } = this;
     if (!active || !settings) return;
     const { backend, renderer } = active;
-    if (backend !== 'cpu') {
+    if (backend !== 'cpu' || renderer.snapshot) {
       // The canvas of a graphics device keeps its picture only until the script ends.
       try {
-        void renderer.render(settings.light, settings.output, 1);
-        this.listener.rendererChanged({ canvas: this.ports.copyCanvas(renderer) });
+        if (backend !== 'cpu') void renderer.render(settings.light, settings.output, 1);
+        const canvas = renderer.snapshot?.(MAX_RESTING_SIDE) ?? this.ports.copyCanvas(renderer);
+        this.listener.rendererChanged({ canvas });
       } catch {
         return;
       }

@@ -19,7 +19,8 @@ export const MAX_TORCH_SIZE = 100;
 const LIGHT_SIZE_HINT = 'it is a fraction of the light’s shorter side';
 /** The WebAssembly modules use this radius when none is given. */
 export const DEFAULT_TORCH_SIZE = 1 / 7;
-const MAX_ZOOM = 100;
+/** Of the attribute, and of views until the size of the picture is known. */
+export const MAX_ZOOM = 100;
 /** The meaning of `zoom` without a value, but for very large pictures. */
 export const EMPTY_ZOOM = 8;
 const MAX_SIZE_PIXELS = 1e6;

@@ -3,7 +3,7 @@
 import { parseLightColor } from '../lights/light-color.js';
 import { reuse } from '../shared/reuse-if-equal.js';
 import { CENTRE, type PicturePoint } from '../shared/value-types.js';
-import { EMPTY_ZOOM } from './attribute-parsers.js';
+import { EMPTY_ZOOM, MAX_ZOOM } from './attribute-parsers.js';
 import type { AttributeReader } from './attribute-reader.js';
 
 /** A pixel of the picture can fill one of a screen where the box of the picture has at least so many. */
@@ -45,7 +45,8 @@ function readAttributes(reader: AttributeReader, side: number) {
     loading: reader.read('loading'),
     reveal: reader.read('reveal'),
     controls: reader.has('controls'),
-    maxZoom: reader.read('zoom') ?? Math.max(EMPTY_ZOOM, side / MIN_BOX_PIXELS),
+    maxZoom:
+      reader.read('zoom') ?? (side > 0 ? Math.max(EMPTY_ZOOM, side / MIN_BOX_PIXELS) : MAX_ZOOM),
     cooperativeGestures: reader.has('cooperative-gestures'),
     autoplayLight: reader.has('autoplay-light'),
     kioskSeconds: reader.read('kiosk'),
