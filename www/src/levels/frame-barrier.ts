@@ -8,7 +8,7 @@ export class FrameBarrier {
   /** `count` is how often `pass` will be called. */
   constructor(private count: number) {}
 
-  /** Calls `draw` with a function that waits for all others. Who does not call it is not waited for. */
+  /** Calls `draw` with a function that waits for all others. A renderer that does not call it is not waited for. */
   pass<T>(draw: (ready: () => Promise<void>) => T): T {
     let hasArrived = false;
     const arrive = () => {

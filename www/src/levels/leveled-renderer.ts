@@ -1,6 +1,6 @@
 /**
  * Draws a photograph of several levels: the root by a renderer of its own, and over it the shards that the view needs, each by
- * another, on a canvas at its place. They arrive in the background; what is there is drawn under the same light.
+ * another, on a canvas at its place. Shards arrive in the background; those in memory are drawn under the same light.
  *
  * It is a separate script, because most photographs have one level.
  */
@@ -115,7 +115,7 @@ class LeveledRenderer implements Renderer {
       this.#shown = shown;
       this.#layer.show(shown);
       cache.show(this, shown);
-      // One that was replaced during the frame is shown until the next.
+      // A shard that was replaced during the frame is shown until the next frame.
       for (const shard of this.#outgoing) {
         if (shown.has(shard)) continue;
         this.#outgoing.delete(shard);

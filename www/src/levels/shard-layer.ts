@@ -60,7 +60,7 @@ export class ShardLayer {
     addEventListener('resize', () => this.requestFrame(), { signal: this.#end.signal });
   }
 
-  /** What is visible of the picture; `null` if nothing is. */
+  /** The visible part of the picture; `null` if there is none. */
   view(): PictureView | null {
     const { element, table } = this;
     const picture = element.getBoundingClientRect();

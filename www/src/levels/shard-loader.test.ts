@@ -41,7 +41,7 @@ test('what is needed no more is cancelled, and what is needed still goes on', as
     started.map(({ signal }) => signal.aborted),
     [true, false, false],
   );
-  // One that was cancelled is no failure.
+  // A load that was cancelled has not failed.
   loader.request([shard(0)]);
   await settled();
   assert.equal(started.at(-1)?.key, '0 0 0');

@@ -2,7 +2,7 @@
 
 import type { LevelTable, PixelRect, ShardId } from './level-table.js';
 
-/** What is visible of a picture. */
+/** The visible part of a picture. */
 export interface PictureView {
   readonly rect: PixelRect;
   /** Device pixels along the side of a pixel of level 0. */
