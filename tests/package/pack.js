@@ -29,6 +29,7 @@ const SCRIPTS = [
     '-decoder',
     '-sources',
     '-input',
+    '-levels',
   ].map((part) => `relightable-photo${part}`),
   ...['fr', 'de', 'it', 'es', 'ja', 'zh', 'zh-hant'].map(
     (language) => `relightable-photo-${language}`,
