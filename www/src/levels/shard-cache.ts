@@ -1,5 +1,7 @@
 /** The shards in memory, of all elements of the page. Beyond a limit, those that were not seen for longest are freed. */
 
+import { memoryLimit } from '../shared/memory-limit.js';
+
 /** A shard in memory. */
 export interface CachedShard {
   /** Memory that it takes: its tiles, and what drawing them needs. */
@@ -11,19 +13,13 @@ export interface CachedShard {
 const MAX_BYTES = 160 * 2 ** 20;
 const MAX_BYTES_PER_GIB = 40 * 2 ** 20;
 
-/** The device's memory in GiB is known in some browsers, up to 8. */
-function defaultMaxBytes(): number {
-  const { deviceMemory = 8 } = (globalThis.navigator ?? {}) as { readonly deviceMemory?: number };
-  return Math.min(MAX_BYTES, deviceMemory * MAX_BYTES_PER_GIB);
-}
-
 export class ShardCache {
   /** The least recently seen first. */
   readonly #shards = new Set<CachedShard>();
   /** Those that an element shows. */
   readonly #shown = new Map<unknown, ReadonlySet<CachedShard>>();
 
-  constructor(readonly maxBytes = defaultMaxBytes()) {}
+  constructor(readonly maxBytes = memoryLimit(MAX_BYTES, MAX_BYTES_PER_GIB)) {}
 
   add(shard: CachedShard): void {
     this.#shards.add(shard);

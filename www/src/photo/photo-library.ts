@@ -4,6 +4,7 @@
  * first; their elements keep a resting picture, and open them again when they come near.
  */
 
+import { memoryLimit } from '../shared/memory-limit.js';
 import { Deferred, withTimeout } from '../shared/promises.js';
 import type { LoadOptions } from './load-options.js';
 import { LoadQueue, OUT_OF_VIEW, type Placement, type QueuedLoad } from './load-queue.js';
@@ -40,12 +41,6 @@ export type LoadPhoto = (address: PhotoAddress, options: LoadOptions) => Promise
 const MAX_DECODED_BYTES = 256 * 2 ** 20;
 const MAX_DECODED_BYTES_PER_GIB = 64 * 2 ** 20;
 
-/** The device's memory in GiB is known in some browsers, up to 8. */
-function defaultMaxDecodedBytes(): number {
-  const { deviceMemory = 8 } = (globalThis.navigator ?? {}) as { readonly deviceMemory?: number };
-  return Math.min(MAX_DECODED_BYTES, deviceMemory * MAX_DECODED_BYTES_PER_GIB);
-}
-
 export class PhotoLibrary {
   /** The entry that an address has now. */
   readonly #entries = new Map<unknown, LibraryEntry>();
@@ -56,7 +51,7 @@ export class PhotoLibrary {
   constructor(
     private readonly load: LoadPhoto,
     private readonly queue = new LoadQueue(),
-    private readonly maxDecodedBytes = defaultMaxDecodedBytes(),
+    private readonly maxDecodedBytes = memoryLimit(MAX_DECODED_BYTES, MAX_DECODED_BYTES_PER_GIB),
   ) {}
 
   /**
