@@ -1,7 +1,7 @@
 //! Where a shard begins in the level that it is a part of.
 
 use super::displacement_grid::DisplacementGrid;
-use super::geometry::{Extent, LightPosition};
+use super::geometry::{Extent, LightPosition, TileRect};
 use super::light_region::LightRegion;
 
 /// The first pixel and light element of a shard, in its level; zero for a whole picture.
@@ -40,11 +40,9 @@ impl ShardOrigin {
 
     /// Whether the light plane of a shard, of `extent`, lies within that of its level.
     pub fn is_valid(self, extent: Extent) -> bool {
-        let is_in = |axis: usize, count: u32| {
-            let end = self.light[axis].checked_add(count);
-            end.is_some_and(|end| end <= self.plane[axis])
-        };
-        self == Self::ZERO || (is_in(0, extent.width) && is_in(1, extent.height))
+        let ([x, y], [width, height]) = (self.light, self.plane);
+        let seen = TileRect { x, y, extent };
+        self == Self::ZERO || seen.is_within(Extent::new(width, height))
     }
 
     /// The fields one after another.
