@@ -58,16 +58,13 @@ const browser = await chromium.launch(chromiumOptions('--disable-gpu-compositing
 const watch = () => {
   const element = () => /** @type {any} */ (document.querySelector('relightable-photo'));
   const canvases = () => [...element().shadowRoot.querySelectorAll('.content canvas')];
-  const counts = { frames: 0, changed: 0 };
+  const counts = { frames: 0 };
   const put = CanvasRenderingContext2D.prototype.putImageData;
   CanvasRenderingContext2D.prototype.putImageData = function (/** @type {any[]} */ ...args) {
     // The root's first rows.
     if (this.canvas === canvases()[0] && args[2] === 0) counts.frames += 1;
     return Reflect.apply(put, this, args);
   };
-  new PerformanceObserver((list) => {
-    if (list.getEntries().length > 0) counts.changed = performance.now();
-  }).observe({ type: 'resource' });
   const shown = new Promise((resolve) => {
     const look = () => {
       if (element()?.quality) resolve(performance.now());
@@ -78,9 +75,11 @@ const watch = () => {
   Object.assign(globalThis, { element, canvases, counts, shown });
 };
 
-/** @param {string} origin */
-async function open(origin, context = browser.newContext({ viewport: VIEWPORT })) {
-  const page = await (await context).newPage();
+const newContext = () => browser.newContext({ viewport: VIEWPORT });
+
+/** @param {string} origin @param {import('playwright-core').BrowserContext} context */
+async function open(origin, context) {
+  const page = await context.newPage();
   page.setDefaultTimeout(0);
   page.on('pageerror', (error) => console.error(`page: ${error}`));
   await page.addInitScript(PAGE_SCRIPT);
@@ -111,11 +110,11 @@ function record(name, value) {
 }
 
 async function firstPicture() {
-  const context = await browser.newContext({ viewport: VIEWPORT });
+  const context = await newContext();
   const times = [];
   // The first round fills the cache.
   for (let turn = 0; turn <= TURNS; turn += 1) {
-    const page = await open(line.origin, Promise.resolve(context));
+    const page = await open(line.origin, context);
     if (turn > 0) times.push(Number(await page.evaluate('shown')));
     await page.close();
   }
@@ -127,7 +126,7 @@ async function views() {
   const ratios = /** @type {number[]} */ ([]);
   const rates = /** @type {number[]} */ ([]);
   for (const zoom of ZOOMS) {
-    const page = await open(origin);
+    const page = await open(origin, await newContext());
     await settled(page);
     const before = fetched;
     await page.evaluate(`element().view = { zoom: ${zoom}, x: 0.45, y: 0.4 }`);
@@ -170,7 +169,7 @@ async function views() {
 }
 
 async function journey() {
-  const page = await open(origin);
+  const page = await open(origin, await newContext());
   const peaks = /** @type {number[]} */ (
     await page.evaluate(`(async () => {
       const peaks = [];

@@ -44,16 +44,7 @@ interface Frame {
 
 const cache = new ShardCache();
 
-/** Takes `root` over. `photograph` is the one that `root` draws. */
-export function createLeveledRenderer(
-  root: Renderer,
-  photograph: LoadedPhotograph,
-  createShardRenderer: CreateShardRenderer,
-): Renderer {
-  return new LeveledRenderer(root, photograph, createShardRenderer);
-}
-
-class LeveledRenderer implements Renderer {
+export class LeveledRenderer implements Renderer {
   readonly canvas: Renderer['canvas'];
   readonly kernel: string;
   readonly gamut: Renderer['gamut'];
@@ -71,6 +62,7 @@ class LeveledRenderer implements Renderer {
   /** How many times four components a shard may have, if all that the view needs are to fit. */
   #quads = 1;
 
+  /** Takes `root` over. `photograph` is the one that `root` draws. */
   constructor(
     private readonly root: Renderer,
     private readonly photograph: LoadedPhotograph,
@@ -263,7 +255,7 @@ class Shard implements CachedShard {
   /** Whether more components may not have fit. */
   get isLimited(): boolean {
     const { width, height, decodedBytes } = this.photograph.info;
-    return decodedBytes + QUAD_BYTES * width * height > this.quads * QUAD_BYTES * width * height;
+    return decodedBytes > (this.quads - 1) * QUAD_BYTES * width * height;
   }
 
   get canvas(): HTMLCanvasElement | null {

@@ -39,8 +39,7 @@ export class ShardLayer {
     // The root's last column and row may reach beyond the picture.
     canvas.style.width = `${(100 * canvas.width * scale) / table.width}%`;
     canvas.style.height = `${(100 * canvas.height * scale) / table.height}%`;
-    Object.assign(element.style, { position: 'absolute', inset: '0', transformOrigin: '0 0' });
-    element.style.pointerEvents = 'none';
+    Object.assign(element.style, { position: 'absolute', inset: '0', pointerEvents: 'none' });
     Object.assign(this.#plane.style, { position: 'absolute', transformOrigin: '0 0' });
     element.append(this.#plane);
     // Its pixels are coarser than those of the picture.

@@ -38,7 +38,7 @@ export const BROWSER_PORTS: SessionPorts = {
       console.warn(missingScript('levels-unavailable', 'finer levels', cause).message);
     });
     if (!levels) return root;
-    return levels.createLeveledRenderer(root, photograph, (shard, onLost, signal) =>
+    return new levels.LeveledRenderer(root, photograph, (shard, onLost, signal) =>
       createRenderer(backend, shard, options, onLost, signal),
     );
   },

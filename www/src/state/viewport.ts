@@ -44,7 +44,7 @@ export function viewOf({ x = 0, y = 0, width, height = width }: PictureRect): Zo
 /** The nearest view inside the picture, with a magnification of at most `maxZoom`. */
 export function clampView({ zoom, x, y }: ZoomView, maxZoom: number): ZoomView {
   const edge = 0.5 / Math.min(maxZoom, Math.max(1, zoom));
-  // Four decimals may be more than a pixel of what is shown.
+  // Four decimals may be more than a pixel of the screen.
   const steps = zoom > FINE_ZOOM ? 1e6 : 1e4;
   const clampCentre = (value: number) => clampAndRound(value, edge, 1 - edge, steps);
   return { zoom: clampAndRound(zoom, 1, maxZoom), x: clampCentre(x), y: clampCentre(y) };

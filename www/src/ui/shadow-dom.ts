@@ -43,7 +43,7 @@ export class ShadowDom {
     { class: 'reveal', part: 'button', type: 'button', hidden: '' },
     createElement('span', { class: 'panel' }, createIcon(LIGHT_ICON), this.#revealText),
   );
-  /** What is moved and magnified. */
+  /** The canvas and its layer. The view moves and magnifies them. */
   readonly content = createElement('div', { class: 'content' });
   readonly #picture = createElement('div', { part: 'picture' }, this.content);
   readonly #posterImage = createElement('img', { part: 'poster', alt: '', hidden: '' });
