@@ -1103,6 +1103,26 @@ fn a_file_that_needs_too_much_memory_is_refused_before_allocation() {
     assert!(reader.index().is_none());
 }
 
+#[test]
+fn the_index_of_a_large_file_needs_memory_for_one_tile() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let file = Recovered::mixed(common::tiled([128, 128], [64, 64], 5, 16, affine), 8, 5);
+    let file = file.file(QUALITY);
+    let limits = Limits {
+        decoded_bytes: smallest_limit(&file) / 2,
+    };
+    let mut reader = LtmReader::of_index(limits);
+    reader.feed(0, &file[..HEADER_BYTES]).unwrap();
+    let end = reader.index_bytes().unwrap() as usize;
+    reader
+        .feed(HEADER_BYTES as u64, &file[HEADER_BYTES..end])
+        .unwrap();
+    assert!(reader.index().is_some());
+    let decoded_bytes = limits.decoded_bytes / 20;
+    let refused = LtmReader::of_index(Limits { decoded_bytes }).feed(0, &file[..end]);
+    assert!(matches!(refused, Err(FormatError::Limit { .. })));
+}
+
 /// The smallest memory limit under which a file opens.
 fn smallest_limit(file: &[u8]) -> u64 {
     let mut decoded_bytes = 0;

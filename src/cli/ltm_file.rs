@@ -96,11 +96,11 @@ fn intact_bytes(index: &FileIndex, error: &anyhow::Error) -> Option<u64> {
     }
 }
 
-/// Opens an `.ltm` file and reads its file index.
+/// Opens an `.ltm` file, of any size, and reads its file index.
 pub fn open_ltm(path: &Path) -> Result<(File, FileIndex)> {
     let read = || -> Result<(File, FileIndex)> {
         let mut file = open(path)?;
-        let mut reader = LtmReader::new(LIMITS);
+        let mut reader = LtmReader::of_index(LIMITS);
         loop {
             if let Some(index) = reader.index() {
                 return Ok((file, index.clone()));

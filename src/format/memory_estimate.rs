@@ -16,15 +16,26 @@ use crate::transport::{CHANNELS, TexelCodes, Tile};
 const STATE_BYTES: u64 = 32;
 const TILE_STATE_BYTES: u64 = 256;
 
+/// What is read of a file at a time.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Part {
+    WholeFile,
+    /// The index and a tile, which are not relit.
+    Tile,
+}
+
 /// Bytes that relighting takes: a picture, a light and the previous light, four floats an element.
-pub(super) fn relight_bytes(header: &Header) -> u64 {
+pub(super) fn relight_bytes(header: &Header, part: Part) -> u64 {
+    if let Part::Tile = part {
+        return 0;
+    }
     let geometry = &header.geometry;
     let elements = geometry.camera.area() as u64 + 2 * geometry.light.area() as u64;
     elements * size_of::<[f32; 4]>() as u64
 }
 
 /// Bytes that the index takes while it is decoded, with what the reader keeps for it and for relighting.
-pub(super) fn index_bytes(header: &Header) -> u64 {
+pub(super) fn index_bytes(header: &Header, part: Part) -> u64 {
     let (tiles, scans) = (
         header.geometry.tile_grid().area() as u64,
         u64::from(header.scans),
@@ -34,7 +45,7 @@ pub(super) fn index_bytes(header: &Header) -> u64 {
     let basis = 4 * basis_chunk::content_bytes(header.rank.into(), area) as u64;
     let displacement = header.geometry.correspondence.displacement.as_ref();
     let control_points = displacement.map_or(0, |grid| grid.codes().len());
-    relight_bytes(header)
+    relight_bytes(header, part)
         + header.index_bytes()
         + (control_points * size_of::<[i16; 2]>()) as u64
         + directory::content_bytes(header)
@@ -50,8 +61,8 @@ pub(super) fn coefficient_bytes(header: &Header, rank: usize) -> u64 {
     texels.sum::<u64>() * size_of::<TexelCodes>() as u64
 }
 
-/// Bytes that reading the whole file takes.
-pub(super) fn file_bytes(index: &FileIndex) -> u64 {
+/// Bytes that reading a file takes.
+pub(super) fn file_bytes(index: &FileIndex, part: Part) -> u64 {
     let Header { geometry, rank, .. } = &index.header;
     let value = (CHANNELS * size_of::<f32>()) as u64;
     let rank = usize::from(*rank);
@@ -68,7 +79,11 @@ pub(super) fn file_bytes(index: &FileIndex) -> u64 {
         let coefficients = pixels * rank as u64 * value;
         let factored = u64::from(is_factored(i));
         let [partial, functions] = partial_functions::max_bytes(index, i);
-        kept += factored * codes.max(coefficients) + partial.max(functions);
+        let tile = factored * codes.max(coefficients) + partial.max(functions);
+        kept = match part {
+            Part::WholeFile => kept + tile,
+            Part::Tile => tile.max(kept),
+        };
         // Coefficients in red, green and blue with a reflection of each pixel, and codes of both.
         let reflections = pixels * 4 * size_of::<f32>() as u64;
         working = working.max(factored * (coefficients + codes + reflections) + functions);
@@ -81,5 +96,5 @@ pub(super) fn file_bytes(index: &FileIndex) -> u64 {
         range.end - range.start + u64::from(content)
     };
     let largest_chunk = index.chunks().map(chunk).max().unwrap_or(0);
-    index_bytes(&index.header) + kept + working + largest_chunk
+    index_bytes(&index.header, part) + kept + working + largest_chunk
 }

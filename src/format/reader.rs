@@ -7,7 +7,7 @@ use super::error::{FormatError, damaged};
 use super::header::{self, Header};
 use super::index::FileIndex;
 use super::memory_budget::{Limits, MemoryBudget};
-use super::memory_estimate;
+use super::memory_estimate::{self, Part};
 use super::metadata::MetadataText;
 use super::partial_file::{ChunkSelection, PartialFile};
 use crate::transport::Transport;
@@ -57,6 +57,8 @@ pub struct LtmReader {
     received_index_bytes: u64,
     /// Bytes that the coefficients may take.
     max_tile_bytes: Option<u64>,
+    /// What it has to have memory for.
+    part: Part,
 }
 
 /// How much of a file has been read.
@@ -82,6 +84,16 @@ impl LtmReader {
             state: None,
             received_index_bytes: 0,
             max_tile_bytes: None,
+            part: Part::WholeFile,
+        }
+    }
+
+    /// A reader for the index alone, which also opens files that are larger than the limits if no tile is: for
+    /// [`decode_tile`](super::decode_tile).
+    pub fn of_index(limits: Limits) -> Self {
+        Self {
+            part: Part::Tile,
+            ..Self::new(limits)
         }
     }
 
@@ -175,9 +187,10 @@ impl LtmReader {
                 return Ok(());
             };
             let header = Header::decode(bytes)?;
-            self.budget.check(memory_estimate::index_bytes(&header))?;
             self.budget
-                .reserve(memory_estimate::relight_bytes(&header))?;
+                .check(memory_estimate::index_bytes(&header, self.part))?;
+            self.budget
+                .reserve(memory_estimate::relight_bytes(&header, self.part))?;
             self.header = Some(header);
             return self.advance();
         };
@@ -185,7 +198,8 @@ impl LtmReader {
             let mut index = FileIndex::decode(header.clone(), &self.gathered, &self.budget)?;
             let limit = self.max_tile_bytes;
             let max_components = limit.and_then(|bytes| index.limit_components(bytes));
-            self.budget.check(memory_estimate::file_bytes(&index))?;
+            let bytes = memory_estimate::file_bytes(&index, self.part);
+            self.budget.check(bytes)?;
             self.header = Some(index.header.clone());
             self.state = Some(PartialFile::new(index, max_components, &self.budget)?);
             self.budget.release_vec(std::mem::take(&mut self.gathered));
