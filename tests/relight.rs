@@ -12,7 +12,7 @@ use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::cpu::CpuRelighter;
 use relightable_photo::relight::{BuiltinLight, Light, OutputTransform, TorchSpot, reference};
 use relightable_photo::transport::{
-    Extent, Geometry, LightPosition, LightRegion, MAX_WINDOW, Tile,
+    CameraPixel, Extent, Geometry, LightPosition, LightRegion, MAX_WINDOW, Tile, TileRect,
 };
 
 /// Grids, windows and tiles of all shapes, with correspondences that rotate, mirror and shift the picture until windows
@@ -170,6 +170,54 @@ fn a_moving_light_leaves_nothing_behind() {
         let mut fresh = CpuRelighter::new(transport.clone());
         fresh.relight(&light, &SequentialExecutor);
         assert_eq!(moved.linear(), fresh.linear(), "step {step}");
+    }
+}
+
+#[test]
+fn pixels_out_of_view_follow_once_they_are_in_view() {
+    let affine = [[1.5, 0.02, 1.0], [0.0, 1.5, -2.0]];
+    let geometry = tiled([90, 70], [140, 110], 15, 32, affine);
+    let transport = relit::asymmetric_transport(geometry.clone(), TileContents::Mixed, 3);
+    let transport = Arc::new(transport);
+    let view = |x: u32, y: u32, width: u32, height: u32| TileRect {
+        x,
+        y,
+        extent: Extent::new(width, height),
+    };
+    let mut relighter = CpuRelighter::new(transport.clone());
+    let output = OutputTransform::srgb(1.0);
+    let views = [
+        view(0, 0, 90, 70),
+        view(20, 10, 30, 20),
+        view(60, 40, 30, 30),
+        view(0, 0, 0, 0),
+        view(89, 69, 1, 1),
+        view(0, 0, 90, 70),
+    ];
+    let lights = relit::lights(geometry.light);
+    for (i, view) in views.into_iter().enumerate() {
+        relighter.set_view(view);
+        // Under the last view, the light stays.
+        let (name, light) = &lights[i.min(views.len() - 2) % lights.len()];
+        relighter.set_quality([1.0, 0.5][i % 2]);
+        relighter.relight(light, &SequentialExecutor);
+        let mut fresh = CpuRelighter::new(transport.clone());
+        fresh.set_quality([1.0, 0.5][i % 2]);
+        fresh.relight(light, &SequentialExecutor);
+        let (got, want) = (
+            relighter.picture(&output, &SequentialExecutor),
+            fresh.picture(&output, &SequentialExecutor),
+        );
+        for y in 0..70 {
+            for x in 0..90 {
+                let is_in = (view.x..view.x + view.extent.width).contains(&x)
+                    && (view.y..view.y + view.extent.height).contains(&y);
+                let at = geometry.camera.index(CameraPixel { x, y });
+                if is_in {
+                    assert_eq!(got.pixels[at], want.pixels[at], "{name}: {x}, {y}");
+                }
+            }
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::{CodedError, Photo, WebOutputTransform};
 use crate::job_executor::SequentialExecutor;
 use crate::relight::cpu::{self, CpuRelighter, STRIP_ROWS};
-use crate::transport::CHANNELS;
+use crate::transport::{CHANNELS, Extent, TileRect};
 
 /// Relights a row range of a photograph. Only its tiles are needed.
 #[wasm_bindgen]
@@ -42,7 +42,31 @@ impl RowRangeRelighter {
         vec![start, end]
     }
 
-    /// Writes the row range under a light into `out`: RGBA, row by row. `light` has linear RGB of the
+    /// Sets the part of the picture that is in view, at first all: pixels `left..right` of rows `top..bottom`.
+    ///
+    /// # Errors
+    /// Code `internal` if the part reaches beyond the picture.
+    #[wasm_bindgen(js_name = setView)]
+    pub fn set_view(
+        &mut self,
+        left: u32,
+        top: u32,
+        right: u32,
+        bottom: u32,
+    ) -> Result<(), CodedError> {
+        let camera = self.relighter.transport().geometry.camera;
+        if left > right || right > camera.width || top > bottom || bottom > camera.height {
+            return Err(CodedError::internal("the view reaches beyond the picture"));
+        }
+        self.relighter.set_view(TileRect {
+            x: left,
+            y: top,
+            extent: Extent::new(right - left, bottom - top),
+        });
+        Ok(())
+    }
+
+    /// Writes the row range under a light into `out`: RGBA, row by row. Rows out of view are not written. `light` has linear RGB of the
     /// [`lightRows`](Self::light_rows); without it, the last light stays. `quality` is the share of the components in use,
     /// 0 to 1. Both arrays are copied in strips: the module's memory never shrinks.
     ///
@@ -82,9 +106,11 @@ impl RowRangeRelighter {
             }
         }
         self.relighter.update(&SequentialExecutor);
-        let mut strip = vec![[0; 4]; STRIP_ROWS.min(self.rows.len()) * width as usize];
-        for first in self.rows.clone().step_by(STRIP_ROWS) {
-            let rows = first..self.rows.end.min(first + STRIP_ROWS as u32);
+        let TileRect { y, extent, .. } = self.relighter.view();
+        let rows = self.rows.start.max(y)..self.rows.end.min(y + extent.height);
+        let mut strip = vec![[0; 4]; STRIP_ROWS.min(rows.len()) * width as usize];
+        for first in rows.clone().step_by(STRIP_ROWS) {
+            let rows = first..rows.end.min(first + STRIP_ROWS as u32);
             let pixels = &mut strip[..rows.len() * width as usize];
             self.relighter
                 .encode_rows(&output.0, rows.clone(), pixels, &SequentialExecutor);

@@ -155,6 +155,10 @@ type _RelighterOf = Extends<
   ConstructorParameters<typeof Cpu.CanvasRelighter>
 >;
 type _RowRangeRelighter = Extends<Cpu.RowRangeRelighter, Omit<RowRangeRelighter, 'relight'>>;
+type _View = Extends<
+  Parameters<RowRangeRelighter['setView']>,
+  Parameters<Cpu.RowRangeRelighter['setView']>
+>;
 type _RowRangeRelighterOf = Extends<
   [Cpu.Photo, number, number],
   ConstructorParameters<typeof Cpu.RowRangeRelighter>
@@ -274,6 +278,7 @@ export type Contract = [
   _WebGpuRenderPicture,
   _RelighterOf,
   _RowRangeRelighter,
+  _View,
   _RowRangeRelighterOf,
   _RowRangeRelight,
   _Kernel,

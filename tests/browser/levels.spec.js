@@ -7,6 +7,7 @@ import {
   mountPhoto,
   screenPicture,
   waitForEvents,
+  waitForFrames,
   waitForLoad,
   waitUntil,
 } from './page-helpers.js';
@@ -82,6 +83,27 @@ test.describe('a photograph of several levels', () => {
     await page.evaluate('photo.view = { zoom: 2, x: 1 }');
     await waitUntil(page, `${shown(1)} === ${NEXT} && ${shown(0)} === 0`);
     expect(ranges(), 'shards stay in memory').toHaveLength(2 + NEXT);
+  });
+
+  test('has the light of the moment also where it was out of view', async ({ openPage }) => {
+    const page = await openPage('/plain', { reducedMotion: 'reduce' });
+    await mountAt(page, WIDTH, { backend: 'cpu', zoom: '16' });
+    await waitUntil(page, `${shown(0)} === ${FINEST}`);
+    for (const [light, x] of /** @type {const} */ ([
+      ['flood', 0],
+      ['stripes', 1],
+      ['checkerboard', 0.4],
+    ])) {
+      await page.evaluate(`photo.view = { zoom: 16, x: ${x} }`);
+      await page.evaluate(`photo.light = '${light}'`);
+      await waitForFrames(page, 2);
+    }
+    await page.evaluate('photo.view = { zoom: 1 }');
+    await waitUntil(page, `${shown(0)} === ${FINEST}`);
+    const native = nativePicture('checkerboard', { photo: LEVELS_FILE });
+    await expect(async () => {
+      expect(await screenPicture(page)).toMatchPicture(native, 2);
+    }).toPass();
   });
 
   test('shows its last level where a server sends no ranges', async ({ openPage }) => {

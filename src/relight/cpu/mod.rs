@@ -3,7 +3,8 @@
 //! Pixels are grouped by *origin block* ([`origin_blocks`]), a square of window origins. Where the light under a
 //! block has changed, the block's basis response is computed ([`correlation`]) and combined with the pixels'
 //! coefficients while it is in the cache ([`combine`]); the functions of direct tiles are summed slot by slot
-//! ([`windowed_sum`]). Other blocks keep their pixels. Blocks are independent, so threads share them.
+//! ([`windowed_sum`]). Other blocks keep their pixels, and so do blocks out of view. Blocks are independent, so threads share
+//! them.
 //!
 //! A basis response is exact to about a millionth of the block's brightest element.
 
@@ -22,7 +23,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use super::output_transform::TabulatedOutputTransform;
 use super::{Light, LightChroma, LinearPicture, OutputTransform, Rgba8Picture, used_count};
 use crate::job_executor::Executor;
-use crate::transport::{CHANNELS, FunctionEntry, Tile, Transport, entries_by_pixel, entry_slot};
+use crate::transport::{
+    CHANNELS, FunctionEntry, Tile, TileRect, Transport, entries_by_pixel, entry_slot,
+};
 use combine::{OriginBlockResponse, combine};
 use correlation::{CorrelationScratch, Correlator};
 use origin_blocks::{DIRECT_BLOCK_SIDE, OriginBlock, OriginBlocks, OriginBoundingBox, PixelSpan};
@@ -57,8 +60,10 @@ pub struct CpuRelighter {
     linear: Vec<RwLock<Vec<[f32; CHANNELS]>>>,
     /// Quads of components in use.
     quads: usize,
-    /// Whether all blocks are out of date, whatever has changed in the light.
-    is_stale: bool,
+    /// Whether each block is out of date, whatever has changed in the light since.
+    is_stale: Vec<bool>,
+    /// The pixels in view.
+    view: TileRect,
     /// Memory of threads that are idle, kept from frame to frame.
     scratch_pool: Mutex<Vec<CorrelationScratch>>,
 }
@@ -89,7 +94,12 @@ impl CpuRelighter {
         Self {
             linear: blocks.blocks.iter().map(dark).collect(),
             quads,
-            is_stale: false,
+            is_stale: vec![false; blocks.blocks.len()],
+            view: TileRect {
+                x: 0,
+                y: 0,
+                extent: geometry.camera,
+            },
             footprint: side + window - 1,
             correlator,
             blocks,
@@ -113,8 +123,21 @@ impl CpuRelighter {
             .as_ref()
             .map_or(0, |correlator| correlator.quads);
         let quads = used_count(all, quality);
-        self.is_stale |= quads != self.quads;
+        if quads != self.quads {
+            self.is_stale.fill(true);
+        }
         self.quads = quads;
+    }
+
+    /// The pixels in view.
+    pub fn view(&self) -> TileRect {
+        self.view
+    }
+
+    /// Sets the pixels in view, at first all. Others are not kept up to date, and not encoded: they become so with the next
+    /// [`update`](Self::update) that has them in view.
+    pub fn set_view(&mut self, view: TileRect) {
+        self.view = view;
     }
 
     /// Relights under a light. Blocks whose light has not changed keep their pixels.
@@ -144,15 +167,20 @@ impl CpuRelighter {
         self.light.set_row(v, elements);
     }
 
-    /// Relights the blocks that are out of date.
+    /// Relights the blocks in view that are out of date.
     pub fn update(&mut self, executor: &impl Executor) {
-        let stale: Vec<usize> = (0..self.blocks.blocks.len())
-            .filter(|&i| {
-                let [u, v] = self.blocks.blocks[i].at;
-                let (columns, rows) = (u..u + self.footprint, v..v + self.footprint);
-                self.is_stale || self.light.has_changed(columns, rows)
-            })
-            .collect();
+        let mut stale = Vec::new();
+        for (i, (block, is_stale)) in
+            (self.blocks.blocks.iter().zip(&mut self.is_stale)).enumerate()
+        {
+            let [u, v] = block.at;
+            let (columns, rows) = (u..u + self.footprint, v..v + self.footprint);
+            *is_stale |= self.light.has_changed(columns, rows);
+            if *is_stale && block.spans.iter().any(|span| span.is_in(&self.view)) {
+                *is_stale = false;
+                stale.push(i);
+            }
+        }
         let this = &*self;
         executor.map(stale.len(), |i| {
             let mut scratch = lock(&this.scratch_pool).pop();
@@ -163,7 +191,6 @@ impl CpuRelighter {
             });
             lock(&this.scratch_pool).extend(scratch);
         });
-        self.is_stale = false;
         self.light.clear_changes();
     }
 
@@ -262,7 +289,7 @@ impl CpuRelighter {
         picture
     }
 
-    /// Writes rows of the picture after an output transform.
+    /// Writes rows of the picture after an output transform. Pixels out of view are black.
     ///
     /// # Panics
     /// If `out` is not as large as the rows.
@@ -287,6 +314,9 @@ impl CpuRelighter {
             let first = rows.start + (i * STRIP_ROWS) as u32;
             let end = first + (out.len() / width) as u32;
             self.for_each_span(first..end, |span, linear| {
+                if !span.is_in(&self.view) {
+                    return;
+                }
                 let at = (span.pixel.y - first) as usize * width + span.pixel.x as usize;
                 encoder.encode(linear, span.pixel, &mut out[at..at + span.length]);
             });

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::transport::{CameraPixel, Extent, Geometry, LightElement, Transport};
+use crate::transport::{CameraPixel, Extent, Geometry, LightElement, TileRect, Transport};
 
 /// The side of blocks where no tile is factored.
 pub const DIRECT_BLOCK_SIDE: usize = 64;
@@ -63,6 +63,14 @@ pub struct PixelSpan {
 impl PixelSpan {
     pub fn range(&self) -> Range<usize> {
         self.begin..self.begin + self.length
+    }
+
+    /// Whether a pixel of it is in `rect`.
+    pub fn is_in(&self, rect: &TileRect) -> bool {
+        let CameraPixel { x, y } = self.pixel;
+        let right = rect.x.saturating_add(rect.extent.width);
+        let bottom = rect.y.saturating_add(rect.extent.height);
+        (rect.y..bottom).contains(&y) && x < right && rect.x < x + self.length as u32
     }
 }
 

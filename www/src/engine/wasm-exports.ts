@@ -110,7 +110,12 @@ export interface CanvasRelighter extends Freeable {
 export interface RowRangeRelighter extends Freeable {
   /** The first light row that is needed, and the end of those rows. */
   readonly lightRows: Uint32Array;
-  /** `light` has linear R, G and B of those rows; `null` reuses the last one. Writes RGBA into `out`, row by row. */
+  /** The part of the picture that is kept up to date, in pixels; at first all of it. */
+  setView(left: number, top: number, right: number, bottom: number): void;
+  /**
+   * `light` has linear R, G and B of those rows; `null` reuses the last one. Writes RGBA into `out`, row by row; rows out of
+   * view are not written.
+   */
   relight(
     light: Float32Array | null,
     transform: OutputTransform,

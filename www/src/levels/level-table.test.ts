@@ -37,6 +37,15 @@ test('a shard has its bytes, and its pixels on level 0', () => {
   assert.deepEqual(TABLE.rectOf({ level: 1, x: 1, y: 0 }), rect);
 });
 
+test('the pixels of a shard in view have a margin, and end where it ends', () => {
+  const view = { left: 600, top: 100, right: 900, bottom: 2200 };
+  const part = (level: number, x: number, y: number) =>
+    TABLE.pixelsIn(view, { level, x, y }, { width: 512, height: 450 });
+  assert.deepEqual(part(0, 1, 0), { left: 56, top: 68, right: 420, bottom: 450 });
+  assert.deepEqual(part(1, 0, 0), { left: 268, top: 18, right: 482, bottom: 450 });
+  assert.deepEqual(part(0, 2, 0), { left: 0, top: 68, right: 0, bottom: 450 });
+});
+
 test('a photograph of another place is refused as a shard', () => {
   const shard = { level: 1, x: 1, y: 0 };
   const geometry = Float64Array.of(238, 450, 100, 99, 15, 32, 512, 0, 200, 0, 375, 225);

@@ -1,7 +1,7 @@
 /** The levels of a photograph, and their shards: which pixels each has, and which bytes of the file. */
 
 import { PhotoError } from '../shared/errors.js';
-import type { ByteRange } from '../shared/value-types.js';
+import type { ByteRange, PixelRect } from '../shared/value-types.js';
 
 /** A square part of a level. Level 0 is the finest. */
 export interface ShardId {
@@ -11,13 +11,14 @@ export interface ShardId {
   readonly y: number;
 }
 
-/** A part of the picture, in pixels of level 0. */
-export interface PixelRect {
-  readonly left: number;
-  readonly top: number;
-  readonly right: number;
-  readonly bottom: number;
+/** In pixels. */
+interface PictureSize {
+  readonly width: number;
+  readonly height: number;
 }
+
+/** Pixels around those in view that are drawn too, as the view may move until the frame is shown. */
+const MARGIN = 32;
 
 /** The numbers before those of the shards, and those of each shard. */
 const FIXED_NUMBERS = 6;
@@ -67,6 +68,11 @@ export class LevelTable {
     return range(top, bottom, this.height).flatMap((y) => columns.map((x) => ({ level, x, y })));
   }
 
+  /** All pixels of level 0. */
+  get picture(): PixelRect {
+    return { left: 0, top: 0, right: this.width, bottom: this.height };
+  }
+
   /** Its pixels, on level 0. */
   rectOf({ level, x, y }: ShardId): PixelRect {
     const side = this.shardSide * 2 ** level;
@@ -74,10 +80,24 @@ export class LevelTable {
     return { left, top, right: left + side, bottom: top + side };
   }
 
+  /** The pixels of a shard, which has this size, in a part of the picture and a little around it. `part` is in level 0. */
+  pixelsIn(part: PixelRect, shard: ShardId, { width, height }: PictureSize): PixelRect {
+    const { left, top } = this.rectOf(shard);
+    const pixel = (at: number, first: number, side: number) =>
+      Math.min(side, Math.max(0, Math.round((at - first) / 2 ** shard.level)));
+    const margin = MARGIN * 2 ** shard.level;
+    return {
+      left: pixel(part.left - margin, left, width),
+      top: pixel(part.top - margin, top, height),
+      right: pixel(part.right + margin, left, width),
+      bottom: pixel(part.bottom + margin, top, height),
+    };
+  }
+
   /** Throws `format-invalid` if a photograph is not the shard with this name. `geometry` is as the decoder packs it. */
   checkPlace(
     shard: ShardId,
-    { width, height, geometry }: { width: number; height: number; geometry: Float64Array },
+    { width, height, geometry }: PictureSize & { readonly geometry: Float64Array },
   ): void {
     const scale = 2 ** shard.level;
     const levelOf = (side: number) => Math.ceil(side / scale);

@@ -9,15 +9,17 @@ import type { OutputSettings } from '../engine/output-settings.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
-import type { Renderer } from '../renderers/types.js';
+import { QualityController } from '../renderers/quality-controller.js';
+import type { FramePart, Renderer } from '../renderers/types.js';
 import { PhotoError, toPhotoError } from '../shared/errors.js';
 import { allSettledOrThrow } from '../shared/promises.js';
+import type { PixelRect } from '../shared/value-types.js';
 import { FrameBarrier } from './frame-barrier.js';
-import { keyOf, LevelTable, type PixelRect, type ShardId } from './level-table.js';
+import { keyOf, LevelTable, type ShardId } from './level-table.js';
 import { type CachedShard, ShardCache } from './shard-cache.js';
 import { ShardLayer } from './shard-layer.js';
 import { ShardLoader } from './shard-loader.js';
-import { overlap, selectShards } from './shard-selection.js';
+import { contains, overlap, type PictureView, selectShards } from './shard-selection.js';
 
 /** Memory for a pixel beside its tiles: the canvas, its copy in a worker, and the picture in linear light. */
 const BYTES_PER_PIXEL = 20;
@@ -25,6 +27,8 @@ const BYTES_PER_PIXEL = 20;
 const QUAD_BYTES = 24;
 /** A view of fewer shards leaves room for others, among them those that are being loaded. */
 const MIN_SHARDS = 4;
+/** A coarser level has as many times fewer pixels. */
+const PIXEL_FACTOR = 4;
 /** A shard is loaded again for more components if it may have so many times as many. */
 const MIN_GAIN = 2;
 
@@ -39,7 +43,10 @@ export type CreateShardRenderer = (
 interface Frame {
   readonly light: LightSetting;
   readonly output: OutputSettings;
+  /** Share of the components. */
   readonly quality: number;
+  /** The pixels that are drawn. */
+  readonly view: PixelRect;
 }
 
 const cache = new ShardCache();
@@ -48,7 +55,7 @@ export class LeveledRenderer implements Renderer {
   readonly canvas: Renderer['canvas'];
   readonly kernel: string;
   readonly gamut: Renderer['gamut'];
-  readonly qualityController: Renderer['qualityController'];
+  readonly qualityController = new QualityController(PIXEL_FACTOR);
   readonly layer: HTMLElement;
   readonly #table: LevelTable;
   readonly #layer: ShardLayer;
@@ -68,11 +75,10 @@ export class LeveledRenderer implements Renderer {
     private readonly photograph: LoadedPhotograph,
     private readonly createShardRenderer: CreateShardRenderer,
   ) {
-    const { canvas, kernel, gamut, qualityController } = root;
+    const { canvas, kernel, gamut } = root;
     this.canvas = canvas;
     this.kernel = kernel;
     this.gamut = gamut;
-    this.qualityController = qualityController;
     this.#table = new LevelTable(photograph.descriptor.levels);
     this.#layer = new ShardLayer(canvas, this.#table, () => this.#hide());
     this.layer = this.#layer.element;
@@ -86,20 +92,29 @@ export class LeveledRenderer implements Renderer {
     return this.root.warning ?? '';
   }
 
-  render(light: LightSetting, output: OutputSettings, quality: number) {
-    const shown = this.#update();
+  /** With less quality it draws a coarser level. Shards often have so few components that fewer of them save little. */
+  render(light: LightSetting, output: OutputSettings, ownQuality: number, part: FramePart = {}) {
+    const view = this.#layer.view();
+    const shown = this.#update(view, ownQuality < 1);
+    const quality = Math.min(1, PIXEL_FACTOR * ownQuality);
+    const drawn = part.onlyInView && view ? view.box : this.#table.picture;
     const barrier = new FrameBarrier(shown.size + 1);
     const drawings: Promise<unknown>[] = [];
     for (const shard of shown) {
       try {
-        const frame = { light, output, quality };
+        const view = this.#table.pixelsIn(drawn, shard.id, shard.size);
+        const frame = { light, output, quality, view };
         const drawing = barrier.pass((ready) => shard.draw(frame, ready));
         if (drawing) drawings.push(drawing.catch(() => this.#lose(shard)));
       } catch {
         this.#lose(shard);
       }
     }
-    const status = barrier.pass((ready) => this.root.render(light, output, quality, ready));
+    const status = barrier.pass((ready) => {
+      const id = { level: this.#table.levels - 1, x: 0, y: 0 };
+      const view = this.#table.pixelsIn(drawn, id, this.canvas);
+      return this.root.render(light, output, quality, { view, ready });
+    });
     // Not before they are drawn.
     const show = () => {
       for (const shard of shown) if (shard.isFreed) shown.delete(shard);
@@ -153,8 +168,7 @@ export class LeveledRenderer implements Renderer {
   }
 
   /** Gives the shards of the view that are in memory, and loads the others. */
-  #update(): Set<Shard> {
-    const view = this.#layer.view();
+  #update(view: PictureView | null, isCoarse: boolean): Set<Shard> {
     if (!view) {
       this.#hide();
       return new Set();
@@ -162,7 +176,8 @@ export class LeveledRenderer implements Renderer {
     const isLoaded = (id: ShardId) => this.#shards.has(keyOf(id));
     const { pixels } = this;
     const maxShards = Math.floor(cache.maxBytes / ((BYTES_PER_PIXEL + QUAD_BYTES) * pixels));
-    const selection = selectShards(this.#table, view, isLoaded, Math.max(maxShards, MIN_SHARDS));
+    const limit = Math.max(maxShards, MIN_SHARDS);
+    const selection = selectShards(this.#table, view, isLoaded, limit, isCoarse);
     const { needed } = selection;
     const bytes = cache.maxBytes / Math.max(needed.length, MIN_SHARDS);
     this.#quads = Math.max(1, Math.floor((bytes / pixels - BYTES_PER_PIXEL) / QUAD_BYTES));
@@ -252,6 +267,10 @@ class Shard implements CachedShard {
     readonly evict: () => void,
   ) {}
 
+  get size() {
+    return this.photograph.info;
+  }
+
   /** Whether more components may not have fit. */
   get isLimited(): boolean {
     const { width, height, decodedBytes } = this.photograph.info;
@@ -273,7 +292,7 @@ class Shard implements CachedShard {
     const isSame =
       last?.light === frame.light && last.output === frame.output && last.quality === frame.quality;
     // The content of an image may have changed.
-    if (isSame && frame.light.image === null) return null;
+    if (isSame && frame.light.image === null && contains(last.view, frame.view)) return null;
     this.#last = frame;
     return this.#render(frame, ready);
   }
@@ -296,9 +315,10 @@ class Shard implements CachedShard {
     this.photograph.free();
   }
 
-  #render({ light, output, quality }: Frame, ready?: () => Promise<void>): Promise<unknown> | null {
+  #render(frame: Frame, ready?: () => Promise<void>): Promise<unknown> | null {
     if (this.isFreed) return null;
-    const drawn = this.renderer?.render(light, output, quality, ready);
+    const { light, output, quality, view } = frame;
+    const drawn = this.renderer?.render(light, output, quality, { view, ready });
     this.#isInWorkers = drawn instanceof Promise;
     return drawn instanceof Promise ? drawn : null;
   }

@@ -2,7 +2,8 @@
 
 import type { Gamut } from '../engine/wasm-exports.js';
 import type { PhotoError } from '../shared/errors.js';
-import type { LevelTable, PixelRect } from './level-table.js';
+import type { PixelRect } from '../shared/value-types.js';
+import type { LevelTable } from './level-table.js';
 import type { PictureView } from './shard-selection.js';
 
 /** A change of the visible share of the picture by this part is noticed. */
@@ -11,6 +12,7 @@ const VISIBILITY_STEPS = 20;
 /** A shard that is drawn. */
 export interface PlacedShard {
   readonly id: { readonly level: number };
+  /** In pixels of level 0. */
   readonly rect: PixelRect;
   readonly canvas: HTMLCanvasElement | null;
 }
@@ -66,13 +68,17 @@ export class ShardLayer {
     const box = element.parentElement?.parentElement?.getBoundingClientRect();
     if (!box || picture.width === 0 || picture.height === 0) return null;
     const [across, down] = [table.width / picture.width, table.height / picture.height];
-    const left = (Math.max(box.left, 0) - picture.left) * across;
-    const top = (Math.max(box.top, 0) - picture.top) * down;
-    const right = (Math.min(box.right, innerWidth) - picture.left) * across;
-    const bottom = (Math.min(box.bottom, innerHeight) - picture.top) * down;
-    if (left >= right || top >= bottom) return null;
+    const pixels = (left: number, top: number, right: number, bottom: number): PixelRect => ({
+      left: (left - picture.left) * across,
+      top: (top - picture.top) * down,
+      right: (right - picture.left) * across,
+      bottom: (bottom - picture.top) * down,
+    });
+    const [right, bottom] = [Math.min(box.right, innerWidth), Math.min(box.bottom, innerHeight)];
+    const rect = pixels(Math.max(box.left, 0), Math.max(box.top, 0), right, bottom);
+    if (rect.left >= rect.right || rect.top >= rect.bottom) return null;
     const scale = devicePixelRatio / Math.min(across, down);
-    return { rect: { left, top, right, bottom }, scale };
+    return { rect, scale, box: pixels(box.left, box.top, box.right, box.bottom) };
   }
 
   /** Shows these, and no others. */

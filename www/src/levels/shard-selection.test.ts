@@ -13,12 +13,13 @@ function view(left: number, top: number, pixels: number, scale: number) {
 }
 
 test('the level has about one pixel for each device pixel', () => {
-  const level = (scale: number) => selectShards(TABLE, view(0, 0, 800, scale), ALL, 40).level;
+  const level = (scale: number) =>
+    selectShards(TABLE, view(0, 0, 800, scale), ALL, 40, false).level;
   assert.deepEqual([4, 1, 0.75, 0.6, 0.5, 0.3, 0.01].map(level), [0, 0, 0, 1, 1, 2, 5]);
 });
 
 test('a coarser level comes first, and then the shards from the middle outwards', () => {
-  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), NONE, 40);
+  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), NONE, 40, false);
   const [first, second, ...others] = needed;
   assert.deepEqual(first, { level: 2, x: 0, y: 0 });
   assert.deepEqual(second, { level: 0, x: 1, y: 1 });
@@ -29,19 +30,39 @@ test('a coarser level comes first, and then the shards from the middle outwards'
 });
 
 test('once all shards are there, no coarser one is needed', () => {
-  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), ALL, 40);
+  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), ALL, 40, false);
   assert.equal(needed.length, 9);
   assert.equal(isComplete, true);
 });
 
+test('a frame of less quality has a coarser level, once that is there', () => {
+  const frame = (isLoaded: (shard: ShardId) => boolean) =>
+    selectShards(TABLE, view(100, 100, 1400, 1), isLoaded, 40, true);
+  const before = frame(({ level }) => level === 0);
+  assert.equal(before.level, 0);
+  assert.equal(before.isComplete, true);
+  assert.equal(before.needed.filter(({ level }) => level === 1).length, 4);
+  const after = frame(({ level }) => level === 1);
+  assert.equal(after.level, 1);
+  assert.equal(after.isComplete, true);
+  assert.equal(
+    after.needed.filter(({ level }) => level === 0).length,
+    9,
+    'for the picture at rest',
+  );
+  const small = selectShards(TABLE, view(0, 0, 16384, 1 / 16), NONE, 40, true);
+  assert.deepEqual([small.level, small.isComplete], [5, true], 'the root is always there');
+  assert.equal(selectShards(TABLE, view(0, 0, 16384, 1 / 64), NONE, 40, true).level, 5);
+});
+
 test('two levels before the root, nothing comes first', () => {
-  const { needed } = selectShards(TABLE, view(0, 0, 16384, 1 / 8), NONE, 40);
+  const { needed } = selectShards(TABLE, view(0, 0, 16384, 1 / 8), NONE, 40, false);
   assert.deepEqual(new Set(needed.map(({ level }) => level)), new Set([3]));
-  assert.deepEqual(selectShards(TABLE, view(0, 0, 16384, 1 / 64), NONE, 40).needed, []);
+  assert.deepEqual(selectShards(TABLE, view(0, 0, 16384, 1 / 64), NONE, 40, false).needed, []);
 });
 
 test('a screen with more pixels than shards may have gets a coarser level', () => {
-  const { level, needed } = selectShards(TABLE, view(0, 0, 8192, 1), NONE, 40);
+  const { level, needed } = selectShards(TABLE, view(0, 0, 8192, 1), NONE, 40, false);
   assert.equal(level, 2);
   const finest = (shards: readonly ShardId[]) => shards.filter((shard) => shard.level === level);
   assert.equal(finest(needed).length, 16);

@@ -1,16 +1,19 @@
 /** Which shards a view needs, and which of those in memory it shows. */
 
-import type { LevelTable, PixelRect, ShardId } from './level-table.js';
+import type { PixelRect } from '../shared/value-types.js';
+import type { LevelTable, ShardId } from './level-table.js';
 
-/** The visible part of a picture. */
+/** The visible part of a picture, in pixels of level 0. */
 export interface PictureView {
   readonly rect: PixelRect;
+  /** The part in the element's box, with what lies beyond the window. */
+  readonly box: PixelRect;
   /** Device pixels along the side of a pixel of level 0. */
   readonly scale: number;
 }
 
 export interface ShardSelection {
-  /** The level that the view should have; that of the root if it suffices. */
+  /** The level that the frame should have; that of the root if it suffices. */
   readonly level: number;
   /** The shards to load, the most urgent first. Some of them may be in memory. */
   readonly needed: readonly ShardId[];
@@ -21,12 +24,13 @@ export interface ShardSelection {
 /** Coarser by this many levels comes first: a sixteenth of the bytes. */
 const COARSE_STEPS = 2;
 
-/** A view that needs more than `maxShards` gets a coarser level. */
+/** A view that needs more than `maxShards` gets a coarser level; with `isCoarse` the one after it, once that is in memory. */
 export function selectShards(
   table: LevelTable,
-  { rect, scale }: PictureView,
+  { rect, scale }: Pick<PictureView, 'rect' | 'scale'>,
   isLoaded: (shard: ShardId) => boolean,
   maxShards: number,
+  isCoarse: boolean,
 ): ShardSelection {
   const root = table.levels - 1;
   // Between 0.7 and 1.4 pixels of the level for a device pixel.
@@ -38,13 +42,20 @@ export function selectShards(
   }
   const isComplete = shards.every(isLoaded);
   const coarse = isComplete ? [] : table.shardsIn(level + COARSE_STEPS, rect);
-  const needed = [...coarse, ...nearestFirst(table, shards, rect)];
-  return { level, needed, isComplete };
+  const next = isCoarse ? table.shardsIn(level + 1, rect) : [];
+  const needed = [...coarse, ...next, ...nearestFirst(table, shards, rect)];
+  const isNext = isCoarse && level < root && next.every(isLoaded);
+  return isNext ? { level: level + 1, needed, isComplete: true } : { level, needed, isComplete };
 }
 
 /** Whether two parts of the picture have pixels in common. */
 export function overlap(a: PixelRect, b: PixelRect): boolean {
   return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+}
+
+/** Whether all pixels of `b` are in `a`. */
+export function contains(a: PixelRect, b: PixelRect): boolean {
+  return a.left <= b.left && b.right <= a.right && a.top <= b.top && b.bottom <= a.bottom;
 }
 
 function nearestFirst(table: LevelTable, shards: readonly ShardId[], view: PixelRect) {

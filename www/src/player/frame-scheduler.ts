@@ -14,7 +14,7 @@ export class FrameScheduler {
   hasPicture = false;
   /** The last frame is out of date. */
   #isStale = false;
-  /** The last frame has reduced quality. */
+  /** The last frame has reduced quality, or only the part in view. */
   #isReduced = false;
   #isFrameRequested = false;
   #cancelRest = (): void => {};

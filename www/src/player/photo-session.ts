@@ -339,14 +339,17 @@ export class PhotoSession {
     this.#scheduler.frameStarted();
     try {
       const startMs = this.ports.now();
-      let frame = active.renderer.render(light, output, quality);
+      const { renderer } = active;
+      let frame = renderer.render(light, output, quality, { onlyInView: !isFullQuality });
       if (!isFullQuality) this.#measure(active, startMs, frame);
       if (frame instanceof Promise) {
         active.frame = new Deferred();
         frame = await frame;
       }
       if (active.photo.value.isComplete) this.#refetches = 0;
-      if (active === this.#selector.active) this.#report(active, frame, light, quality);
+      // Only pictures with finer parts may be drawn in part.
+      const isReduced = quality < 1 || (!isFullQuality && renderer.snapshot !== undefined);
+      if (active === this.#selector.active) this.#report(active, frame, light, quality, isReduced);
       return active.renderer;
     } catch (thrown) {
       if (active.isFreed || active !== this.#selector.active) {
@@ -381,11 +384,12 @@ export class PhotoSession {
     frame: AppliedLightStatus,
     light: LightSetting,
     frameQuality: number,
+    isReduced: boolean,
   ): void {
     const quality = frameQuality * active.photo.value.completeness;
     const isChanged = quality !== this.#quality;
     this.#quality = quality;
-    this.#scheduler.frameDrawn(frameQuality < 1);
+    this.#scheduler.frameDrawn(isReduced);
     if (!active.hasDrawn) {
       active.hasDrawn = true;
       this.#resting = null;

@@ -65,6 +65,17 @@ for (const [full, share] of [
   });
 }
 
+test('with another factor, quality changes by that', () => {
+  const controller = new QualityController(4);
+  const { frames, shares } = animate(controller);
+  frames(20, linear(100));
+  assert.equal(controller.quality, 1 / 4);
+  frames(20, linear(600));
+  assert.equal(controller.quality, 1 / 16);
+  frames(200, linear(30));
+  assert.deepEqual(new Set(shares.slice(40)), new Set([1 / 16, 1 / 4, 1]));
+});
+
 test('outliers change nothing', () => {
   const controller = new QualityController();
   const { frames, shares } = animate(controller);

@@ -3,8 +3,6 @@
  * and end of such frames, and has no clock: every delay is a number of frames.
  */
 
-/** Quality changes by factors of two. Half of the components take at best half of the time. */
-const MIN_QUALITY = 1 / 4;
 const FRAME_BUDGET_MS = 1000 / 30;
 /** Longer frames are slow. Above the budget, because a display of 30 Hz shows no frame sooner. */
 const SLOW_FRAME_MS = 1.2 * FRAME_BUDGET_MS;
@@ -48,6 +46,12 @@ export class QualityController {
   #drop: QualityBeforeDrop | null = null;
   #noDropBeforeFrame = 0;
   #dropDelay = DROP_DELAY_FRAMES;
+  readonly #minQuality: number;
+
+  /** Quality has three values, with this factor between them; at best, it is that of the frames' durations too. */
+  constructor(private readonly factor = 2) {
+    this.#minQuality = factor ** -2;
+  }
 
   /** Records a frame of an animation. `endMs` is when the next frame could have begun, whether or not one was due. */
   recordFrame(startMs: number, endMs: number): void {
@@ -71,7 +75,7 @@ export class QualityController {
   }
 
   get #canLower(): boolean {
-    return this.quality > MIN_QUALITY && this.#frames >= this.#noDropBeforeFrame;
+    return this.quality > this.#minQuality && this.#frames >= this.#noDropBeforeFrame;
   }
 
   /** A lower quality does not help if the page itself is slow, or its display. */
@@ -94,15 +98,16 @@ export class QualityController {
       ? Math.min(2 * this.#raiseDelay, MAX_RAISE_DELAY_FRAMES)
       : RAISE_DELAY_FRAMES;
     this.#drop = { quality: this.quality, ms };
-    let quality = this.quality / 2;
-    while (quality > MIN_QUALITY && this.#expectedMs(ms, quality) > FRAME_BUDGET_MS) quality /= 2;
+    let quality = this.quality / this.factor;
+    const isSlow = () => this.#expectedMs(ms, quality) > FRAME_BUDGET_MS;
+    while (quality > this.#minQuality && isSlow()) quality /= this.factor;
     this.#setQuality(quality);
   }
 
   /** Rarely, it also tries a quality that is not expected to fit. */
   #raiseIfDue(ms: number): void {
     if (this.quality === 1) return;
-    const quality = 2 * this.quality;
+    const quality = this.factor * this.quality;
     const isLikely = this.#expectedMs(ms, quality) <= MAX_EXPECTED_MS;
     const delay = isLikely ? this.#raiseDelay : UNLIKELY_RAISE_FACTOR * this.#raiseDelay;
     if (this.#frames - this.#changedAtFrame < delay) return;

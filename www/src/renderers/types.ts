@@ -5,6 +5,7 @@ import type { Backend, Freeable, Gamut } from '../engine/wasm-exports.js';
 import type { AppliedLightStatus } from '../lights/light-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
+import type { PixelRect } from '../shared/value-types.js';
 import type { QualityController } from './quality-controller.js';
 
 /** Which backends may draw, and in which colours. */
@@ -14,6 +15,16 @@ export interface BackendPreferences {
   /** Whether WebGPU and WebGL2 may be software renderers. */
   readonly software: boolean;
   readonly gamut: Gamut;
+}
+
+/** How much of a frame is drawn, and when. */
+export interface FramePart {
+  /** Pixels out of view may keep an older light. */
+  readonly onlyInView?: boolean;
+  /** The pixels in view, whole numbers within the picture; all by default. */
+  readonly view?: PixelRect;
+  /** A renderer that computes in workers shows the frame once this has settled. */
+  readonly ready?: (() => Promise<void>) | undefined;
 }
 
 export interface Renderer extends Freeable {
@@ -28,14 +39,13 @@ export interface Renderer extends Freeable {
   /**
    * Draws one frame with a share of the components (`quality`, 0 to 1). Call it again only after the last promise has
    * settled. If the light is unavailable, the last available one is used and `AppliedLightStatus` has the error. Throws or
-   * rejects with `backend-lost`, or with `photo-lost` if parts of the photograph are lost. A renderer that computes in
-   * workers shows the frame once `ready` has settled.
+   * rejects with `backend-lost`, or with `photo-lost` if parts of the photograph are lost.
    */
   render(
     light: LightSetting,
     output: OutputSettings,
     quality: number,
-    ready?: () => Promise<void>,
+    part?: FramePart,
   ): AppliedLightStatus | Promise<AppliedLightStatus>;
   /** Lies over the canvas: finer parts of the picture. It fires `LayerChangeEvent`. */
   readonly layer?: HTMLElement;

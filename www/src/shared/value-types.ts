@@ -6,6 +6,14 @@ export interface ByteRange {
   readonly end: number;
 }
 
+/** A part of a picture, in pixels; without the column `right` and the row `bottom`. */
+export interface PixelRect {
+  readonly left: number;
+  readonly top: number;
+  readonly right: number;
+  readonly bottom: number;
+}
+
 /** What the file's index says about a photograph. */
 export interface PhotoInfo {
   /** The picture's width in pixels. */

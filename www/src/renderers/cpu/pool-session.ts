@@ -7,7 +7,7 @@ import { allSettledOrThrow, withTimeout } from '../../shared/promises.js';
 import type { FrameSettings, RelightClient, RowRange, RowRangeCommand } from './protocol.js';
 
 export interface RenderedRows extends RowRange {
-  /** RGBA, row by row. */
+  /** RGBA, row by row; valid in view. */
   readonly pixels: ArrayBuffer;
 }
 
@@ -86,11 +86,15 @@ export class PoolSession implements TilesInWorkers {
   }
 
   /**
-   * Relights the whole picture. Call it after `plan`, and again only after it has settled: the next call reuses the
+   * Relights the pixels in view. Call it after `plan`, and again only after it has settled: the next call reuses the
    * memory of the pixels. `light` may be freed at once. The same object is not sent to the workers twice.
    */
   async relight(light: Light, settings: FrameSettings): Promise<RenderedRows[]> {
-    const rowPixels = this.#parts.map((part) => this.#relightPart(part, light, settings));
+    const { top, bottom } = settings.view;
+    const parts = this.#parts.filter(
+      (part) => part.firstRow < bottom && top < part.firstRow + part.rows,
+    );
+    const rowPixels = parts.map((part) => this.#relightPart(part, light, settings));
     const picture = await allSettledOrThrow(rowPixels);
     this.events.frameDrawn();
     return picture;

@@ -3,7 +3,7 @@
 import type { OutputSettings } from '../../engine/output-settings.js';
 import type { Gamut } from '../../engine/wasm-exports.js';
 import type { PhotoDescriptor } from '../../photo/types.js';
-import type { ColorMatrix } from '../../shared/value-types.js';
+import type { ColorMatrix, PixelRect } from '../../shared/value-types.js';
 import type { WorkerClient, WorkerLike } from '../../shared/worker-client.js';
 
 export interface FrameSettings {
@@ -12,6 +12,8 @@ export interface FrameSettings {
   readonly gamut: Gamut;
   /** Share of the components, 0 to 1. */
   readonly quality: number;
+  /** The pixels of the picture that are drawn. */
+  readonly view: PixelRect;
 }
 
 /** Camera rows of a photograph, made of whole rows of tiles. */
@@ -29,7 +31,7 @@ export type RowRangeCommand =
   | { readonly kind: 'take'; readonly index: number }
   /** Prepares relighting. The result is two `Uint32`: the first light row needed, and the end of those rows. */
   | { readonly kind: 'plan' }
-  /** Relights. The result is `pixels`, filled with RGBA row by row. */
+  /** Relights. The result is `pixels`, filled with RGBA row by row in view. */
   | {
       readonly kind: 'relight';
       /** Linear R, G and B of the light rows needed; `null` for those of the last frame. */

@@ -32,8 +32,10 @@ function handle(module: CpuModule, photo: number, task: RowRangeCommand): ArrayB
       const { output, colorMatrix, gamut } = settings;
       const transform = createOutputTransform(module, output, colorMatrix, gamut);
       try {
-        const out = new Uint8Array(pixels);
-        relighterOf(module, stored).relight(light, transform, settings.quality, out);
+        const { left, top, right, bottom } = settings.view;
+        const relighter = relighterOf(module, stored);
+        relighter.setView(left, top, right, bottom);
+        relighter.relight(light, transform, settings.quality, new Uint8Array(pixels));
       } finally {
         transform.free();
       }

@@ -21,6 +21,7 @@ export const FRAME: FrameSettings = {
   colorMatrix: parseColorMatrix(undefined),
   gamut: 'srgb',
   quality: 1,
+  view: { left: 0, top: 0, right: Number.MAX_SAFE_INTEGER, bottom: Number.MAX_SAFE_INTEGER },
 };
 
 /** A short watchdog for tests of silence, and one that slow machines do not trigger. */

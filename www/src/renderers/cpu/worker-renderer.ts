@@ -31,6 +31,7 @@ export async function createWorkerRenderer(
   const gamut = colorSpace === requestedGamut ? requestedGamut : 'srgb';
   const lights = LightCache.of(module, photograph);
   const { colorMatrix } = photograph;
+  const whole = { left: 0, top: 0, right: canvas.width, bottom: canvas.height };
   let isFreed = false;
   const checkNotFreed = () => {
     if (isFreed) throw photoReleased();
@@ -40,13 +41,13 @@ export async function createWorkerRenderer(
     kernel,
     gamut,
     qualityController: new QualityController(),
-    async render(setting, output, quality, ready) {
+    async render(setting, output, quality, { view = whole, ready } = {}) {
       checkNotFreed();
       try {
         return await photograph.withWorkers(pool, async (session) => {
           checkNotFreed();
           const { light, ...result } = lights.get(setting);
-          const settings = { output, colorMatrix, gamut, quality };
+          const settings = { output, colorMatrix, gamut, quality, view };
           const picture = await session.relight(light, settings);
           await ready?.();
           checkNotFreed();
@@ -54,7 +55,9 @@ export async function createWorkerRenderer(
           for (const { firstRow, rows, pixels } of picture) {
             const data = new Uint8ClampedArray(pixels);
             const image = new ImageData(data, canvas.width, rows, { colorSpace: gamut });
-            context.putImageData(image, 0, firstRow);
+            const { left, top, right, bottom } = view;
+            const [width, height] = [right - left, bottom - top];
+            context.putImageData(image, 0, firstRow, left, top - firstRow, width, height);
           }
           return result;
         });
