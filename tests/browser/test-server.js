@@ -3,6 +3,7 @@
 import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 import axe from 'axe-core';
 import { encodePng } from '../../www/tools/pictures.js';
@@ -34,6 +35,8 @@ const ELEMENT = '<script type="module" src="/relightable-photo/relightable-photo
 const FILM = readFileSync(join(import.meta.dirname, '../fixtures/red-then-blue.webm'));
 const SLOW_TRANSFER_PIECES = 40;
 const SLOW_TRANSFER_INTERVAL_MS = 50;
+
+const OPENSEADRAGON = readFileSync(fileURLToPath(import.meta.resolve('openseadragon')), 'utf8');
 
 /** White on the left, black on the right. */
 const HALF_WHITE = encodePng({
@@ -185,6 +188,15 @@ const HANDLERS = {
       `<title>A window</title><script src="/axe.js"></script>${ELEMENT}<main><h1>A window</h1></main>`;
     send('text/html', () => html, headers)(response, request, 1);
   },
+  // A viewer's script and its box, with the size of the photograph of several levels.
+  '/viewer': send('text/html', () =>
+    page(
+      '<style>body { margin: 0 } #viewer { width: 523px; height: 41px }</style>' +
+        '<script src="/openseadragon.js"></script>',
+      '<div id="viewer"></div>',
+    ),
+  ),
+  '/openseadragon.js': send('text/javascript', () => OPENSEADRAGON),
   '/axe.js': send('text/javascript', () => axe.source),
   // The element under the strictest policy, with the page monitor.
   '/monitored': send(

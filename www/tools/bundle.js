@@ -3,7 +3,7 @@
  *
  * - relightable-photo.js: the element in one file, for script tags, with its workers and the scripts that it loads
  *   on demand;
- * - index.js, element.js, core.js and recover.js, which share chunks: for bundlers and import maps;
+ * - index.js, element.js, core.js, recover.js and openseadragon.js, which share chunks: for bundlers and import maps;
  * - types/, custom-elements.json, and the types of the element in JSX.
  */
 
@@ -152,6 +152,7 @@ await Promise.all([
       element: 'www/src/element-entry.ts',
       core: 'www/src/core.ts',
       recover: 'www/src/recover.ts',
+      openseadragon: 'www/src/openseadragon.ts',
     },
   }),
 ]);

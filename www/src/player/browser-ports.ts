@@ -1,33 +1,13 @@
 /** The browser's implementation of the session's ports, for all elements of the page. */
 
-import { forbiddenByPolicy } from '../loading/http-errors.js';
-import { openPhoto } from '../loading/load.js';
-import { createDecoder } from '../photo/create-decoder.js';
+import { loadPhoto } from '../loading/load-photo.js';
 import { PhotoLibrary } from '../photo/photo-library.js';
-import { LoadedPhotograph } from '../photo/photograph.js';
 import { createRenderer, prepare } from '../renderers/renderer-factory.js';
-import { withPolicyErrors } from '../shared/content-security-policy.js';
 import { missingScript } from '../shared/errors.js';
 import { callLater } from '../shared/promises.js';
 import type { SessionPorts } from './types.js';
 
-const library = new PhotoLibrary(async ({ src, credentials }, options) => {
-  if (typeof src !== 'string') {
-    const { descriptor, tiles } = await src.load(options);
-    return new LoadedPhotograph(descriptor, tiles);
-  }
-  return openPhoto(src, options, {
-    createDecoder,
-    fetch: (input, init) =>
-      withPolicyErrors(
-        () => fetch(input, { ...init, credentials }),
-        /^connect-src/,
-        (directive, cause) => forbiddenByPolicy(src, directive, cause),
-      ),
-    yieldToPage,
-    now: () => performance.now(),
-  });
-});
+const library = new PhotoLibrary(loadPhoto);
 
 export const BROWSER_PORTS: SessionPorts = {
   library,
@@ -48,11 +28,6 @@ export const BROWSER_PORTS: SessionPorts = {
   callLater,
   now: () => performance.now(),
 };
-
-function yieldToPage(): Promise<void> {
-  const { scheduler } = globalThis as { scheduler?: { yield?: () => Promise<void> } };
-  return scheduler?.yield?.() ?? new Promise((resolve) => setTimeout(resolve));
-}
 
 function copyCanvas({
   canvas,
