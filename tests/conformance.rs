@@ -15,10 +15,10 @@ use std::sync::Once;
 use common::{Noise, functions, tiled};
 use relightable_photo::format::{
     self, CaptureMetadata, ChunkId, EncodedFile, EncoderInput, EncodingTarget, FileIndex,
-    FormatError, FormatExtension, Limits, LtmReader, Metadata, ShardId,
+    FormatError, FormatExtension, Limits, LtmReader, Metadata, ShardId, Spool,
 };
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::pyramid::{PyramidLayout, PyramidReader, Spool, write_pyramid};
+use relightable_photo::pyramid::{PyramidLayout, PyramidReader, write_pyramid};
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::{
     Basis, CHANNELS, CameraPixel, Correspondence, Decibels, DisplacementGrid, FloatTile, Geometry,
@@ -258,8 +258,8 @@ fn levels() -> Vec<u8> {
     let file = lit.encode(EncodingTarget::Snr(Decibels(25.0)), metadata(), Vec::new());
     let (index, fetch) = chunks(&file);
     let layout = PyramidLayout {
-        levels: 3,
         shard_side: 256,
+        ..PyramidLayout::of_levels(3)
     };
     let spools = [(); 2].map(|()| Spool::new(Cursor::new(Vec::new())));
     let mut out = Vec::new();

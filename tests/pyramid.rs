@@ -10,10 +10,10 @@ use std::ops::Range;
 use common::{Noise, functions, tiled};
 use relightable_photo::format::{
     ChunkId, EncodedFile, EncoderInput, EncodingTarget, FileIndex, FormatError, Limits, LtmReader,
-    Metadata, ShardId, decode_tile,
+    Metadata, ShardId, Spool, decode_tile,
 };
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::pyramid::{PyramidLayout, PyramidReader, Spool, write_pyramid};
+use relightable_photo::pyramid::{PyramidLayout, PyramidReader, write_pyramid};
 use relightable_photo::relight::{Light, reference};
 use relightable_photo::transport::{
     Basis, CHANNELS, CameraPixel, Decibels, DisplacementGrid, Extent, FloatTile, Geometry,
@@ -79,8 +79,8 @@ impl Flat {
     fn with_levels(&self, levels: u32) -> Vec<u8> {
         let spools = [(); 2].map(|()| Spool::new(Cursor::new(Vec::new())));
         let layout = PyramidLayout {
-            levels,
             shard_side: SHARD,
+            ..PyramidLayout::of_levels(levels)
         };
         let (mut file, fetch) = (Vec::new(), |chunk| Ok(self.chunk(chunk)));
         let executor = SequentialExecutor;

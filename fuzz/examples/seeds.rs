@@ -8,9 +8,9 @@ use std::path::Path;
 use fuzzing::choices::Choices;
 use fuzzing::source::ArbitraryInput;
 use image::{DynamicImage, ImageFormat};
-use relightable_photo::format::{EncodingTarget, FormatError, Metadata};
+use relightable_photo::format::{EncodingTarget, FormatError, Metadata, Spool};
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::pyramid::{PyramidLayout, Spool, write_pyramid};
+use relightable_photo::pyramid::{PyramidLayout, write_pyramid};
 use relightable_photo::transport::{
     Basis, Correspondence, Decibels, Extent, FloatTile, Geometry, Window,
 };
@@ -106,8 +106,8 @@ fn levels() -> Result<Vec<u8>, FormatError> {
         Ok(flat[range.start as usize..range.end as usize].to_vec())
     };
     let layout = PyramidLayout {
-        levels: 2,
         shard_side: 256,
+        ..PyramidLayout::of_levels(2)
     };
     let spools = [(); 2].map(|()| Spool::new(Cursor::new(Vec::new())));
     let mut file = Vec::new();

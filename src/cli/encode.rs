@@ -1,6 +1,5 @@
 //! `ltm-export encode`: an `.ltm` file as one of several levels.
 
-use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -10,16 +9,14 @@ use anyhow::{Context, Error, Result, bail, ensure};
 use clap::Args;
 use serde::Serialize;
 
+use super::levels_output::{levels_of, write_levels};
 use super::ltm_file::{open_ltm, read_range};
-use super::output_file::{InputError, LTM, OutputFile, temporary_beside};
+use super::output_file::{InputError, LTM, OutputFile};
 use super::process_resources::{Interrupted, InterruptibleCores, peak_rss_bytes};
 use super::progress;
 use super::report::{format_bytes, print_json, print_line};
 use crate::format::{ChunkId, FormatError, LevelTable};
-use crate::pyramid::{
-    PyramidLayout, SHARD_SIDE, Spool, least_level_count, level_count, write_pyramid,
-};
-use crate::transport::Extent;
+use crate::pyramid::PyramidLayout;
 
 /// Write a large relightable photograph as one of several levels, of which viewers fetch the part and the level that are
 /// seen
@@ -74,24 +71,18 @@ pub fn run(args: &EncodeArgs) -> Result<()> {
         let bytes = read_range(&mut file, index.range(chunk));
         bytes.map_err(|error| FormatError::Source(io::Error::other(format!("{error:#}"))))
     };
-    let layout = PyramidLayout {
-        levels: args
-            .levels(index.header.geometry.camera)
-            .with_context(name)?,
-        shard_side: SHARD_SIDE,
-    };
-    let temporary = || -> Result<Spool<File>> {
-        let (_, folder) = temporary_beside(&args.output, 0o600);
-        let file = tempfile::tempfile_in(folder).map_err(FormatError::Spool);
-        Ok(Spool::new(
-            file.with_context(|| args.output.display().to_string())?,
-        ))
-    };
-    let spools = [temporary()?, temporary()?];
+    let camera = index.header.geometry.camera;
+    let levels = levels_of(args.levels, camera).with_context(name)?;
+    ensure!(
+        levels > 1,
+        "{}: has {camera} pixels, for which one level is best; give --levels if you want more",
+        name()
+    );
+    let layout = PyramidLayout::of_levels(levels);
     let spinner = progress::spinner("coarsening");
     let mut shards = 1;
     let file_bytes = output.finish_from_input(|out| {
-        let written = write_pyramid(&index, &fetch, layout, spools, &cores, out);
+        let written = write_levels(&args.output, &index, &fetch, layout, &cores, out);
         let table = written.map_err(|error| match error {
             FormatError::Write(_) | FormatError::Spool(_) => error.into(),
             FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => {
@@ -104,7 +95,7 @@ pub fn run(args: &EncodeArgs) -> Result<()> {
     })?;
     drop(spinner);
     let report = EncodeReport {
-        levels: layout.levels,
+        levels,
         shards,
         seconds: start.elapsed().as_secs_f64(),
         peak_rss_bytes: peak_rss_bytes(),
@@ -114,27 +105,6 @@ pub fn run(args: &EncodeArgs) -> Result<()> {
     match args.json {
         true => print_json(&report),
         false => report.print(args),
-    }
-}
-
-impl EncodeArgs {
-    /// The number of levels for a picture of `camera` pixels.
-    fn levels(&self, camera: Extent) -> Result<u32> {
-        let usual = level_count(camera);
-        let Some(levels) = self.levels else {
-            ensure!(
-                usual > 1,
-                "has {camera} pixels, for which one level is best; give --levels if you want more"
-            );
-            return Ok(usual);
-        };
-        // The last level is one shard.
-        let least = least_level_count(camera, SHARD_SIDE);
-        ensure!(
-            levels >= least,
-            "has {camera} pixels, which need --levels {least} or more"
-        );
-        Ok(levels)
     }
 }
 

@@ -3,18 +3,15 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use anyhow::{Result, ensure};
 use clap::Args;
-use rayon::prelude::*;
 use serde::Serialize;
 
-use super::ltm_file::{PrefixLength, read_ltm};
-use super::process_resources::AllCoresExecutor;
+use super::finest_level::FinestLevel;
+use super::ltm_file::PrefixLength;
 use super::report::{format_bytes, print_json, print_line};
-use crate::capture::{CaptureFolder, GroundTruth, PhotographRowReader};
-use crate::relight::cpu::CpuRelighter;
+use crate::capture::{CameraRowSet, CaptureFolder, GroundTruth, PhotographRowReader};
 use crate::relight::{BuiltinLight, Light};
 use crate::study::{CaptureTruth, psnr};
 use crate::transport::{CHANNELS, Decibels, Geometry, SnrAccumulator, transport_error};
@@ -86,23 +83,21 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
 
 /// Compares the file of `args` with its capture.
 pub fn evaluate(args: &EvaluateArgs) -> Result<EvaluateReport> {
-    let file = read_ltm(&args.file, args.first)?;
-    let header = &file.index.header;
+    let mut file = FinestLevel::open(&args.file, args.first)?;
     let folder = CaptureFolder::open(&args.capture)?;
-    ensure_same_geometry(&header.geometry, &args.file, &folder)?;
+    ensure_same_geometry(&file.geometry, &args.file, &folder)?;
     let mut report = EvaluateReport {
-        file_bytes: header.file_bytes,
-        read_bytes: file.progress.bytes,
-        read_scans: file.progress.scans,
-        scans: file.index.scans.len(),
+        file_bytes: file.file_bytes,
+        read_bytes: file.read_bytes,
+        read_scans: file.read_scans,
+        scans: file.scans,
         ..EvaluateReport::default()
     };
-    let mut relighter = CpuRelighter::new(Arc::new(file.transport));
     if let Some(truth) = folder.truth()? {
-        report.compare_with_truth(&mut relighter, truth)?;
+        report.compare_with_truth(&mut file, truth)?;
     }
-    let used = file.index.metadata.read()?.shots_used;
-    report.compare_with_photographs(&mut relighter, &folder, &used)?;
+    let used = file.metadata.read()?.shots_used;
+    report.compare_with_photographs(&mut file, &folder, &used)?;
     Ok(report)
 }
 
@@ -128,51 +123,36 @@ pub fn ensure_same_geometry(
 }
 
 impl EvaluateReport {
-    fn compare_with_truth(
-        &mut self,
-        relighter: &mut CpuRelighter,
-        truth: GroundTruth,
-    ) -> Result<()> {
-        let geometry = relighter.transport().geometry.clone();
+    fn compare_with_truth(&mut self, file: &mut FinestLevel, truth: GroundTruth) -> Result<()> {
+        let geometry = file.geometry.clone();
         for name in truth.lights()? {
             let light = Light::from_linear_rgb(geometry.light, &truth.light(&name)?.rgb())?;
-            relighter.relight(&light, &AllCoresExecutor);
-            let picture = relighter.linear();
-            let pixels = picture.pixels.iter();
-            let relit: Vec<_> = pixels.map(|p| [0, 1, 2].map(|c| f64::from(p[c]))).collect();
+            let picture = file.picture(&light)?.into_iter();
+            let relit: Vec<_> = picture.map(|pixel| pixel.map(f64::from)).collect();
             let psnr = psnr(&truth.relit(&name)?, &relit);
             self.relit.insert(name, psnr);
         }
         let known = CaptureTruth::new(truth, geometry.correspondence.clone())?;
-        let transport = relighter.transport();
-        let errors = transport.tiles.par_iter().map(|tile| {
-            let functions = tile.functions(&geometry, &transport.basis);
-            transport_error(&known, &geometry, &functions)
-        });
-        self.snr_db = errors.sum::<SnrAccumulator>().snr();
+        let error = |functions: &_| transport_error(&known, &geometry, functions);
+        self.snr_db = file.sum_over_tiles(error)?.snr();
         Ok(())
     }
 
     /// Compares predicted pictures with the flood photograph and with those of the shots not in `used`.
     fn compare_with_photographs(
         &mut self,
-        relighter: &mut CpuRelighter,
+        file: &mut FinestLevel,
         folder: &CaptureFolder,
         used: &[usize],
     ) -> Result<()> {
-        let plane = relighter.transport().geometry.light;
+        let plane = file.geometry.light;
         let dark = folder.read_dark()?;
         let mut errors = [SnrAccumulator::default(); CHANNELS];
         let mut fitted_errors = SnrAccumulator::default();
         for i in (0..folder.manifest().shots.len()).filter(|i| !used.contains(i)) {
             let light = Light::from_linear_rgb(plane, &folder.read_pattern(i)?.rgb())?;
             let mut of_photo = [SnrAccumulator::default(); CHANNELS];
-            let moments = add_error(
-                &mut of_photo,
-                relighter,
-                &light,
-                folder.open_shot(i, &dark)?,
-            )?;
+            let moments = add_error(&mut of_photo, file, &light, folder.open_shot(i, &dark)?)?;
             let (gain, stray_light) = moments.fit_line();
             let fitted = moments.error_of_line(gain, stray_light);
             self.heldout_table.push(HeldOutPhotograph {
@@ -204,7 +184,7 @@ impl EvaluateReport {
         if let Some(photo) = folder.open_flood(&dark)? {
             let light = BuiltinLight::Flood.render(plane);
             let mut errors = [SnrAccumulator::default(); CHANNELS];
-            add_error(&mut errors, relighter, &light, photo)?;
+            add_error(&mut errors, file, &light, photo)?;
             self.flood_snr_db = errors.into_iter().sum::<SnrAccumulator>().snr();
         }
         Ok(())
@@ -288,22 +268,26 @@ impl SampleMoments {
 /// measured samples.
 fn add_error(
     errors: &mut [SnrAccumulator; CHANNELS],
-    relighter: &mut CpuRelighter,
+    file: &mut FinestLevel,
     light: &Light,
-    reader: PhotographRowReader,
+    mut reader: PhotographRowReader,
 ) -> Result<SampleMoments> {
-    relighter.relight(light, &AllCoresExecutor);
-    let picture = relighter.linear();
-    let (photo, _) = reader.read_all()?;
     let mut moments = SampleMoments::default();
-    for (predicted, measured) in picture.pixels.iter().zip(&photo) {
-        for c in 0..CHANNELS {
-            if measured[c].is_finite() {
-                let sample = [f64::from(predicted[c]), f64::from(measured[c])];
-                errors[c].add(sample[1], sample[0]);
-                moments.add(sample[0], sample[1]);
+    let mut photo = Vec::new();
+    file.relight(light, |rows, picture| {
+        photo.clear();
+        reader.read(&CameraRowSet::from_strips([rows]), &mut photo)?;
+        for (predicted, measured) in picture.iter().zip(&photo) {
+            for c in 0..CHANNELS {
+                if measured[c].is_finite() {
+                    let sample = [f64::from(predicted[c]), f64::from(measured[c])];
+                    errors[c].add(sample[1], sample[0]);
+                    moments.add(sample[0], sample[1]);
+                }
             }
         }
-    }
+        Ok(())
+    })?;
+    reader.finish()?;
     Ok(moments)
 }

@@ -6,12 +6,12 @@ use std::num::ParseFloatError;
 use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 
 use super::value_parsers::ByteCount;
 use crate::format::{
-    ChunkSelection, FileIndex, FormatError, HEADER_BYTES, LevelTable, Limits, LtmReader,
-    ReadProgress, SectionName,
+    ChunkSelection, FileIndex, FormatError, HEADER_BYTES, Limits, LtmReader, ReadProgress,
+    SectionName,
 };
 use crate::transport::Transport;
 
@@ -44,12 +44,6 @@ pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
             );
             return Err(reader.truncated().into());
         };
-        if let Some(table) = LevelTable::read(&index)? {
-            bail!(
-                "has {} levels; this command reads files of one level, as before `encode`",
-                table.levels()
-            );
-        }
         let progress = reader.progress();
         let transport = fed.and_then(|()| match first {
             Some(_) => Ok(reader.finish_early()?),

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::memory_plan::FILE_TILE_SIDE;
 use super::tile_record;
 use crate::format::{
-    DistortionMetric, EncodedFile, EncoderInput, EncodingTarget, FormatError, Metadata,
+    ChunkStore, DistortionMetric, EncodedFile, EncoderInput, EncodingTarget, FormatError, Metadata,
 };
 use crate::job_executor::Executor;
 use crate::recover::{HoldoutValidation, PreparedRecovery};
@@ -56,18 +56,20 @@ impl DistortionMetric for HoldoutValidation {
     }
 }
 
-/// Encodes the tiles of `recovery`; `record` gives that of a tile, as [`encode_tile`](super::encode_tile) made it.
+/// Encodes the tiles of `recovery`; `record` gives that of a tile, as [`encode_tile`](super::encode_tile) made it, and
+/// `new_store` a store for the chunks.
 ///
 /// # Errors
-/// Those of [`EncodedFile::new`]. A record that cannot be read is [`FormatError::Source`], and so is cancellation, as
+/// Those of [`EncodedFile::new_in`]. A record that cannot be read is [`FormatError::Source`], and so is cancellation, as
 /// [`ErrorKind::Interrupted`].
-pub fn encode_file(
+pub fn encode_file<S: ChunkStore>(
     recovery: &PreparedRecovery,
     record: &(dyn Fn(usize) -> io::Result<Vec<u8>> + Sync),
     metadata: Metadata,
     quality: FileQuality,
     executor: &impl Executor,
-) -> Result<EncodedFile, FormatError> {
+    new_store: impl Fn() -> Result<S, FormatError> + Sync,
+) -> Result<EncodedFile<S>, FormatError> {
     let tile = |i| match executor.is_cancelled() {
         true => Err(ErrorKind::Interrupted.into()),
         false => file_tile(recovery, record, i),
@@ -79,7 +81,8 @@ pub fn encode_file(
         metadata,
         extensions: Vec::new(),
     };
-    EncodedFile::new(
+    EncodedFile::new_in(
+        new_store,
         source,
         quality.target(recovery.holdout_validation()),
         executor,

@@ -16,6 +16,7 @@
 
 mod checksum;
 mod chunk;
+mod chunk_store;
 mod codec;
 mod constants;
 mod directory;
@@ -35,9 +36,14 @@ mod partial_file;
 mod partial_functions;
 mod reader;
 mod scan;
+#[cfg(not(target_arch = "wasm32"))]
+mod spool;
 mod tile_decoder;
 
 pub use chunk::{ChunkEntry, ChunkId};
+pub use chunk_store::ChunkStore;
+#[cfg(not(target_arch = "wasm32"))]
+pub use chunk_store::SpooledChunks;
 pub use constants::{FIRST_BYTES, HEADER_BYTES, MAX_RANK};
 pub use encode::{DistortionMetric, EncodedFile, EncoderInput, EncodingTarget};
 pub use error::{FormatError, SectionName, TextModeDamage};
@@ -51,4 +57,6 @@ pub use metadata::{CaptureMetadata, Metadata, MetadataText};
 pub use partial_file::ChunkSelection;
 pub use reader::{LtmReader, ReadProgress};
 pub use scan::{ProgressiveScan, ScanCoding};
+#[cfg(not(target_arch = "wasm32"))]
+pub use spool::Spool;
 pub use tile_decoder::{check, decode_basis, decode_tile};

@@ -122,6 +122,48 @@ pub fn shard(geometry: &Geometry, rect: TileRect) -> Geometry {
     }
 }
 
+/// The geometry of a level of `camera` pixels and `light` elements, from those of all its shards: the inverse of [`shard`].
+pub fn whole(camera: Extent, light: Extent, shards: &[Geometry]) -> Option<Geometry> {
+    let first = shards.first()?;
+    let grids = shards.iter().filter_map(|shard| {
+        let Correspondence {
+            displacement,
+            origin,
+            ..
+        } = &shard.correspondence;
+        Some((displacement.as_ref()?, origin.camera))
+    });
+    let mut displacement: Option<(&DisplacementGrid, Extent, Vec<[i16; 2]>)> = None;
+    for (grid, [x, y]) in grids {
+        let spacing = grid.spacing();
+        let (_, points, codes) = displacement.get_or_insert_with(|| {
+            let points = DisplacementGrid::points_over(camera, spacing);
+            (grid, points, vec![[0; 2]; points.area()])
+        });
+        let [column, row] = [x, y].map(|first| first / spacing);
+        for ((i, j), code) in grid.points().cells().zip(grid.codes()) {
+            let (i, j) = (column + i, row + j);
+            if i < points.width && j < points.height {
+                codes[(j * points.width + i) as usize] = *code;
+            }
+        }
+    }
+    let displacement = displacement.map(|(grid, points, codes)| {
+        DisplacementGrid::new(grid.spacing(), grid.step(), points, codes)
+    });
+    Some(Geometry {
+        camera,
+        light,
+        window: first.window,
+        correspondence: Correspondence {
+            affine: first.correspondence.affine,
+            displacement: displacement.and_then(Result::ok).map(Into::into),
+            origin: ShardOrigin::ZERO,
+        },
+        tile_side: first.tile_side,
+    })
+}
+
 /// The control points of a shard of `camera` pixels.
 fn shard_displacement(
     grid: &DisplacementGrid,

@@ -7,7 +7,6 @@
 //! ```text
 //! geometry     geometry of a level        -> of the next level, of a shard
 //! coarsening   fine tiles                 -> coarse tile
-//! spool        shards and tiles           -> temporary file, and back
 //! writer       geometry, shards of level 0 -> levels, file
 //! reader       file, shard                 -> transport
 //! ```
@@ -15,9 +14,7 @@
 mod coarsening;
 mod geometry;
 mod reader;
-mod spool;
 mod writer;
 
 pub use reader::{PyramidReader, Shard};
-pub use spool::Spool;
 pub use writer::{PyramidLayout, SHARD_SIDE, least_level_count, level_count, write_pyramid};

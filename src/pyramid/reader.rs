@@ -3,11 +3,12 @@
 use std::io::{self, ErrorKind};
 use std::ops::Range;
 
+use super::geometry;
 use crate::format::{
     ChunkSelection, FileIndex, FormatError, HEADER_BYTES, LevelTable, Limits, LtmReader, ShardId,
     ShardPlace,
 };
-use crate::transport::{Extent, TileRect, Transport};
+use crate::transport::{Extent, Geometry, TileRect, Transport};
 
 /// A file of several levels, whose root has been read. Bytes come from a callback.
 #[derive(Clone, Debug)]
@@ -89,6 +90,37 @@ impl PyramidReader {
     ) -> Result<FileIndex, E> {
         let OpenedShard { reader, .. } = self.open(shard, fetch)?;
         Ok(reader.index().cloned().ok_or_else(|| reader.truncated())?)
+    }
+
+    /// The geometry of a level. `fetch` gives bytes of the file.
+    ///
+    /// # Errors
+    /// The errors of `fetch`, and a [`FormatError`] if a shard is damaged or there is no such level.
+    pub fn geometry<E: From<FormatError>>(
+        &self,
+        level: u32,
+        mut fetch: impl FnMut(Range<u64>) -> Result<Vec<u8>, E>,
+    ) -> Result<Geometry, E> {
+        if level == self.table.levels() - 1 {
+            return Ok(self.root.header.geometry.clone());
+        }
+        let missing = || {
+            let reason = format!("there is no level {level}");
+            FormatError::Source(io::Error::new(ErrorKind::NotFound, reason))
+        };
+        if level >= self.table.levels() {
+            return Err(missing().into());
+        }
+        let (camera, light) = (self.table.camera(level), self.table.light(level));
+        let whole = TileRect {
+            x: 0,
+            y: 0,
+            extent: camera,
+        };
+        let shards = self.shards_in(level, whole);
+        let shards = shards.map(|id| Ok(self.index(id, &mut fetch)?.header.geometry));
+        let shards = shards.collect::<Result<Vec<_>, E>>()?;
+        Ok(geometry::whole(camera, light, &shards).ok_or_else(missing)?)
     }
 
     /// Reads the tiles of a shard that have pixels of `rect`, in its level. `fetch` gives bytes of the file.

@@ -8,11 +8,10 @@ use std::ops::Range;
 
 use super::coarsening::{Coarsening, unit_basis};
 use super::geometry;
-use super::spool::Spool;
 use crate::export::{decode_tile as decode_record, encode_tile as encode_record};
 use crate::format::{
     ChunkId, EncodedFile, EncoderInput, EncodingTarget, FileIndex, FormatError, FormatExtension,
-    LevelTable, Metadata, MetadataText, ShardId, ShardPlace, decode_basis, decode_tile,
+    LevelTable, Metadata, MetadataText, ShardId, ShardPlace, Spool, decode_basis, decode_tile,
 };
 use crate::job_executor::Executor;
 use crate::transport::{Basis, Extent, FloatTile, Geometry, TileRect};
@@ -33,6 +32,19 @@ pub struct PyramidLayout {
     pub levels: u32,
     /// Side of the shards in pixels, a power of two; usually [`SHARD_SIDE`].
     pub shard_side: u32,
+    /// The largest file.
+    pub max_bytes: u64,
+}
+
+impl PyramidLayout {
+    /// So many levels of the usual shards, in a file of any size.
+    pub fn of_levels(levels: u32) -> Self {
+        Self {
+            levels,
+            shard_side: SHARD_SIDE,
+            max_bytes: u64::MAX,
+        }
+    }
 }
 
 /// Number of levels that a picture of `camera` pixels should have.
@@ -59,7 +71,7 @@ type FetchChunk<'a> = dyn Fn(ChunkId) -> Result<Vec<u8>, FormatError> + Sync + '
 /// [`FormatError::DamagedSection`] if the last level would have more than one shard or a number is out of range,
 /// [`FormatError::InvalidGeometry`] if no window covers those of a finer level, [`FormatError::Source`] if the side of a tile is
 /// not a power of two ([`ErrorKind::InvalidInput`]) or the work is cancelled ([`ErrorKind::Interrupted`]),
-/// [`FormatError::Spool`], [`FormatError::Write`], also for a shard of more than 4 GiB ([`ErrorKind::FileTooLarge`]), and the
+/// [`FormatError::TooLarge`], [`FormatError::Spool`], [`FormatError::Write`], also for a shard of more than 4 GiB ([`ErrorKind::FileTooLarge`]), and the
 /// errors of `fetch` and of [`EncodedFile`].
 pub fn write_pyramid<F: Read + Write + Seek + Send>(
     index: &FileIndex,
@@ -70,7 +82,11 @@ pub fn write_pyramid<F: Read + Write + Seek + Send>(
     out: &mut impl Write,
 ) -> Result<LevelTable, FormatError> {
     let geometry = &index.header.geometry;
-    let PyramidLayout { levels, shard_side } = layout;
+    let PyramidLayout {
+        levels,
+        shard_side,
+        max_bytes,
+    } = layout;
     let table = LevelTable::new(geometry.camera, geometry.light, levels, shard_side)?;
     if !geometry.tile_side.is_power_of_two() {
         let reason = "the side of its tiles is not a power of two; recover the photograph again";
@@ -87,6 +103,7 @@ pub fn write_pyramid<F: Read + Write + Seek + Send>(
         shards,
         tiles,
         executor,
+        max_bytes,
     };
     writer.write(out)
 }
@@ -132,6 +149,7 @@ struct PyramidWriter<'a, F, E> {
     /// Tiles of one shard.
     tiles: Spool<F>,
     executor: &'a E,
+    max_bytes: u64,
 }
 
 /// A shard in the temporary file.
@@ -166,7 +184,13 @@ impl<F: Read + Write + Seek + Send, E: Executor> PyramidWriter<'_, F, E> {
                 let bytes = bytes.map_err(|_| ErrorKind::FileTooLarge.into());
                 self.table.set_bytes(i, bytes.map_err(FormatError::Write)?);
             }
-            self.root(&level, coarse)?.write(out)?;
+            let root = self.root(&level, coarse)?;
+            let (bytes, limit) = (root.bytes() + self.table.bytes(), self.max_bytes);
+            if bytes > limit {
+                let smallest = bytes;
+                return Err(FormatError::TooLarge { limit, smallest });
+            }
+            root.write(out)?;
         }
         for place in places {
             self.shards.copy(place, out)?;

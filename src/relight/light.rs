@@ -288,6 +288,22 @@ impl Light {
         }
     }
 
+    /// The part that a region of this light's plane has.
+    ///
+    /// # Panics
+    /// If the region is of another plane.
+    pub fn part(&self, region: LightRegion) -> Self {
+        assert_eq!(self.extent, region.plane, "plane of the region");
+        let width = self.extent.width as usize;
+        let rows = region.rows().map(|v| v as usize * width);
+        let [first, count] = [region.first[0], region.extent.width].map(|u| u as usize);
+        let rows = rows.flat_map(|row| &self.elements[row + first..][..count]);
+        Self {
+            extent: region.extent,
+            elements: rows.copied().collect(),
+        }
+    }
+
     /// Extent of the light plane, or of the part of it.
     pub fn extent(&self) -> Extent {
         self.extent

@@ -167,12 +167,6 @@ fn wrong_levels_and_regions_are_refused_by_name() {
         let message = String::from_utf8(output.stderr).unwrap();
         assert!(message.contains(word), "{message}");
     }
-    let capture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/glass-s");
-    let message = error_message(&["evaluate", text(&file), text(&capture)]);
-    assert!(
-        message.contains("3 levels") && message.contains("one level"),
-        "{message}"
-    );
     let first = run(&[
         "relight",
         text(&file),
@@ -238,4 +232,99 @@ fn damaged_shards_are_found_and_named() {
     assert!(message.contains("cut short"), "{message}");
     let shown = String::from_utf8(inspected.stdout).unwrap();
     assert!(shown.contains("523x41 in 3 levels"), "{shown}");
+}
+
+#[test]
+fn pictures_are_recovered_with_levels_and_evaluated() {
+    let folder = TempDir::new().unwrap();
+    let capture = folder.path().join("capture");
+    let size = ["--camera", "24x600", "--light", "12x300"];
+    let simulate = ["simulate", "stained-glass", "-o", text(&capture)];
+    let output = run(&[&simulate[..], &size, &["--patterns", "30", "--seed", "3"]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let recover = |name: &str, args: &[&str]| {
+        let file = folder.path().join(name);
+        let start = ["recover", text(&capture), "-o", text(&file), "--json"];
+        let report = json(&[&start[..], &["--window", "3"], args].concat());
+        let bytes = fs::metadata(&file).unwrap().len();
+        assert_eq!(report["file_bytes"], bytes);
+        (file, report, bytes)
+    };
+    let (file, report, bytes) = recover("levels.ltm", &["--levels", "2"]);
+    assert_eq!(report["levels"], 2);
+    let (flat, report, flat_bytes) = recover("flat.ltm", &[]);
+    assert_eq!(report["levels"], 1);
+    assert!(flat_bytes < bytes);
+    // The same file as by `encode`.
+    let encoded = folder.path().join("encoded.ltm");
+    let encode = ["encode", text(&flat), "-o", text(&encoded), "--levels", "2"];
+    assert_eq!(json(&[&encode[..], &["--json"]].concat())["levels"], 2);
+    assert!(fs::read(&encoded).unwrap() == fs::read(&file).unwrap());
+
+    let evaluate = |file: &Path| json(&["evaluate", text(file), text(&capture), "--json"]);
+    let (found, expected) = (evaluate(&file), evaluate(&flat));
+    for field in [
+        "snr_db",
+        "heldout_snr_db",
+        "heldout_fitted_snr_db",
+        "flood_snr_db",
+    ] {
+        let [found, expected] = [&found, &expected].map(|report| report[field].as_f64().unwrap());
+        assert!(
+            (found - expected).abs() < 1e-3,
+            "{field}: {found} {expected}"
+        );
+    }
+    assert_eq!(found["file_bytes"], bytes);
+    let output = run(&["evaluate", text(&file), text(&capture), "--first", "10%"]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(message.contains("one level"), "{message}");
+    let page = folder.path().join("report.html");
+    let report = json(&[
+        "report",
+        text(&file),
+        text(&capture),
+        "-o",
+        text(&page),
+        "--json",
+    ]);
+    let snr = report["held_out"]["snr_db"].as_f64().unwrap();
+    assert!((snr - expected["heldout_snr_db"].as_f64().unwrap()).abs() < 1e-3);
+
+    let limit = (3 * bytes / 4).to_string();
+    let args = ["--levels", "2", "--max-bytes", &limit];
+    let (_, report, small) = recover("small.ltm", &args);
+    assert_eq!(report["levels"], 2);
+    assert!(
+        small <= 3 * bytes / 4 && small > bytes / 2,
+        "{small} of {bytes}"
+    );
+    let start = ["recover", text(&capture), "--window", "3"];
+    let out = folder.path().join("tiny.ltm");
+    let args = ["-o", text(&out), "--levels", "2", "--max-bytes", "3kB"];
+    let message = error_message(&[&start[..], &args].concat());
+    assert!(
+        message.contains("more than the 3000 asked for"),
+        "{message}"
+    );
+    // Neither temporary files nor checkpoints of finished recoveries.
+    let mut files: Vec<String> = fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    files.sort();
+    assert_eq!(
+        files,
+        [
+            "capture",
+            "encoded.ltm",
+            "flat.ltm",
+            "levels.ltm",
+            "report.html",
+            "small.ltm",
+            "tiny.ltm.checkpoint"
+        ]
+    );
 }

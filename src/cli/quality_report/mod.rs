@@ -23,7 +23,7 @@ use super::assemble::fit_gray_code;
 use super::calibrate::Distances;
 use super::check::{CheckReport, check_capture};
 use super::evaluate::ensure_same_geometry;
-use super::ltm_file::read_ltm;
+use super::finest_level::FinestLevel;
 use super::output_file::{HTML, OutputFile};
 use super::process_resources::{Interrupted, InterruptibleCores};
 use super::report::{print_json, print_line};
@@ -90,13 +90,13 @@ pub fn run(args: &ReportArgs) -> Result<()> {
 }
 
 fn examine(args: &ReportArgs, cores: &InterruptibleCores) -> Result<(QualityReport, Predictions)> {
-    let file = read_ltm(&args.file, None)?;
+    let mut file = FinestLevel::open(&args.file, None)?;
     let folder = CaptureFolder::open(&args.capture)?;
-    ensure_same_geometry(&file.index.header.geometry, &args.file, &folder)?;
-    let window = file.index.header.geometry.window;
+    ensure_same_geometry(&file.geometry, &args.file, &folder)?;
+    let window = file.geometry.window;
     let check = check_capture(&args.capture, Some(window), cores)?;
     let noise = check.examined.as_ref().map(|examined| examined.noise);
-    let metadata = file.index.metadata.read()?;
+    let metadata = file.metadata.read()?;
     let shots = folder.manifest().shots.len();
     ensure!(
         metadata.shots_used.iter().all(|shot| *shot < shots),
@@ -104,11 +104,10 @@ fn examine(args: &ReportArgs, cores: &InterruptibleCores) -> Result<(QualityRepo
         args.file.display(),
         args.capture.display()
     );
-    let file_snr = file.index.scans.last().map(|scan| scan.snr);
-    let text = file.index.metadata.text().to_owned();
+    let (file_snr, text) = (file.snr, file.metadata.text().to_owned());
     let used = metadata.shots_used;
     let color_matrix = metadata.color_matrix.as_ref();
-    let predictions = Predictions::new(file.transport, &folder, &used, noise, color_matrix, cores)?;
+    let predictions = Predictions::new(&mut file, &folder, &used, noise, color_matrix, cores)?;
     let provenance = CaptureOrigin::read(&args.file, &text, &used, &folder, cores)?;
     let residual = match folder.manifest().graycode.is_empty() {
         true => None,

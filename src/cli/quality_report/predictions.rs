@@ -1,20 +1,18 @@
 //! What a file predicts, beside what the camera saw: pictures, and the error at each pixel.
 
-use std::sync::Arc;
-
 use anyhow::Result;
 use serde::Serialize;
 
 use super::figures::{Histogram, histogram, reduced, white_of};
 use crate::capture::{CaptureFolder, LinearPhoto, NoiseModel, PhotographRowReader};
 use crate::cli::evaluate::SampleMoments;
-use crate::cli::process_resources::{AllCoresExecutor, InterruptibleCores};
+use crate::cli::finest_level::FinestLevel;
+use crate::cli::process_resources::InterruptibleCores;
 use crate::job_executor::Executor;
-use crate::relight::cpu::CpuRelighter;
 use crate::relight::{BuiltinLight, Light, TorchSpot};
 use crate::transport::{
-    CHANNELS, ColorMatrix, Decibels, Extent, SnrAccumulator, Transport, convert_color,
-    light_color_matrix, single_precision,
+    CHANNELS, ColorMatrix, Decibels, Extent, SnrAccumulator, convert_color, light_color_matrix,
+    single_precision,
 };
 
 /// Places of the torch, as shares of the picture.
@@ -119,15 +117,14 @@ impl Predictions {
     /// # Errors
     /// If a photograph cannot be read, or the command is interrupted.
     pub fn new(
-        transport: Transport,
+        file: &mut FinestLevel,
         folder: &CaptureFolder,
         used: &[usize],
         noise: Option<NoiseModel>,
         color_matrix: Option<&ColorMatrix>,
         cores: &InterruptibleCores,
     ) -> Result<Self> {
-        let geometry = transport.geometry.clone();
-        let mut relighter = CpuRelighter::new(Arc::new(transport));
+        let geometry = file.geometry.clone();
         let dark = folder.read_dark()?;
         let mut found = Self {
             camera: geometry.camera,
@@ -146,14 +143,13 @@ impl Predictions {
             let variance = |c: usize, y: f64| {
                 noise.map_or(0.0, |noise| noise.variance(c, y, folder.exposure(i)))
             };
-            let (predicted, measured) =
-                predict(&mut relighter, &light, folder.open_shot(i, &dark)?)?;
+            let (predicted, measured) = predict(file, &light, folder.open_shot(i, &dark)?)?;
             let photo = folder.manifest().shots[i].photo.clone();
             found.compare(i, photo, &predicted, &measured, variance);
         }
         let flood = BuiltinLight::Flood.render(geometry.light);
         if let Some(reader) = folder.open_flood(&dark)? {
-            let (predicted, measured) = predict(&mut relighter, &flood, reader)?;
+            let (predicted, measured) = predict(file, &flood, reader)?;
             let mut snr = SnrAccumulator::default();
             for (predicted, measured) in samples(&predicted, &measured) {
                 snr.add(measured, predicted);
@@ -176,8 +172,7 @@ impl Predictions {
                 Some(matrix) => light.converted(matrix),
                 None => light,
             };
-            relighter.relight(&light, &AllCoresExecutor);
-            let pixels = linear_rgb(&relighter);
+            let pixels = file.picture(&light)?;
             let picture = ReportPicture::new(caption, geometry.camera, pixels, color_matrix);
             found.relit.push(picture);
         }
@@ -283,21 +278,12 @@ fn samples<'a>(
 
 /// The picture predicted under `light`, and the photograph; saturated samples are not finite.
 fn predict(
-    relighter: &mut CpuRelighter,
+    file: &mut FinestLevel,
     light: &Light,
     reader: PhotographRowReader,
 ) -> Result<(Vec<[f32; CHANNELS]>, LinearPhoto)> {
-    relighter.relight(light, &AllCoresExecutor);
     let (photo, _) = reader.read_all()?;
-    Ok((linear_rgb(relighter), photo))
-}
-
-/// The relit picture; the relighter has a fourth number a pixel.
-fn linear_rgb(relighter: &CpuRelighter) -> Vec<[f32; CHANNELS]> {
-    let pixels = relighter.linear().pixels.into_iter();
-    pixels
-        .map(|[red, green, blue, _]| [red, green, blue])
-        .collect()
+    Ok((file.picture(light)?, photo))
 }
 
 /// Standard error in dB of the SNR over all parts: the jackknife.

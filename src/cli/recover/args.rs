@@ -45,6 +45,10 @@ pub struct RecoverArgs {
     /// Store eleven bits of every coefficient, for archives; many times larger
     #[arg(long, group = "rate")]
     lossless: bool,
+    /// Number of levels, each with half the pixels a side of the one before: 1, or down to at most 512 pixels [default: as
+    /// many for pictures of more than 1024 pixels a side, otherwise 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=12))]
+    pub levels: Option<u32>,
     /// Limit on memory; photographs that do not fit are read in strips
     #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
     pub memory: ByteCount,

@@ -1,6 +1,7 @@
 //! One recovery: from the photographs to the file.
 
 use std::cell::OnceCell;
+use std::fs::File;
 use std::io::ErrorKind;
 use std::sync::Mutex;
 use std::time::Instant;
@@ -17,15 +18,22 @@ use super::origin::{FileOrigin, OriginInput};
 use super::preparation::{CapturePreparation, PreparationSettings, PreparedCapture};
 use super::report::{RecoverReport, photograph_reports};
 use crate::capture::{CaptureFolder, DefectivePixels};
+use crate::cli::levels_output::{temporary_spool, write_levels};
 use crate::cli::measurement_reader::MeasurementReader;
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{peak_rss_bytes, thread_pool};
 use crate::cli::progress;
-use crate::export::{self, Provenance};
-use crate::format::{EncodedFile, FormatError, Metadata};
+use crate::export::{self, FileQuality, Provenance};
+use crate::format::{EncodedFile, FormatError, Metadata, SpooledChunks};
 use crate::job_executor::{Cancelled, Executor};
+use crate::pyramid::PyramidLayout;
 use crate::recover::{MIN_PATTERNS, PreparedRecovery, TailEstimate};
-use crate::transport::Basis;
+use crate::transport::{Basis, Decibels, Window};
+
+/// Share of the bytes that the finest of several levels usually takes.
+const LEVEL_0_SHARE: f64 = 0.75;
+/// Share of the bytes that would fit in the next attempt.
+const RETRY_SHARE: f64 = 0.98;
 
 pub struct RecoverJob<'a> {
     pub start: Instant,
@@ -33,7 +41,18 @@ pub struct RecoverJob<'a> {
     pub folder: &'a CaptureFolder,
     /// Indices of the shots to recover from.
     pub shots: &'a [usize],
+    /// Number of levels of the file.
+    pub levels: u32,
     pub source: SampleSource<'a>,
+}
+
+/// Number of components of the tiles that are encoded, if those of the recovery have `rank`.
+pub fn encoded_components(levels: u32, window: Window, rank: usize) -> usize {
+    match levels {
+        1 => rank,
+        // The tiles of coarser levels have one for each element of the window.
+        _ => window.area(),
+    }
 }
 
 impl RecoverJob<'_> {
@@ -81,10 +100,9 @@ impl RecoverJob<'_> {
         let saturated = sample.read.codes.saturated;
         let (method, window) = (self.args.method(), recovery.geometry().window);
         let rank = recovery.basis().map(Basis::rank);
-        let encoders = self
-            .source
-            .plan
-            .tiles_encoded_at_once(window, rank.unwrap_or(0));
+        let levels = self.levels;
+        let components = encoded_components(levels, window, rank.unwrap_or(0));
+        let encoders = self.source.plan.tiles_encoded_at_once(window, components);
         let encoders = encoders.map_err(messages::too_little_memory)?;
         lock(checkpoint).set_fingerprint(recovery_fingerprint(recovery))?;
         let CaptureSample { folder, shots, .. } = &sample;
@@ -109,10 +127,8 @@ impl RecoverJob<'_> {
         let mut metadata = export::metadata(&provenance, method);
         metadata.origin = Some(serde_json::to_value(origin)?);
         let patterns = metadata.capture.patterns;
-        let encode = || self.encode(recovery, checkpoint, metadata);
-        let file = thread_pool(encoders)?.install(encode)?;
-        let output = OutputFile::create(&self.args.output, &LTM)?;
-        let file_bytes = output.finish(|out| Ok(file.write(out)?))?;
+        let write = || self.write(recovery, checkpoint, metadata, levels);
+        let (file_bytes, file_snr_db) = thread_pool(encoders)?.install(write)?;
         Ok(RecoverReport {
             seconds: self.start.elapsed().as_secs_f64(),
             peak_rss_bytes: peak_rss_bytes(),
@@ -127,7 +143,7 @@ impl RecoverJob<'_> {
             patterns,
             photographs: shots.len(),
             expected_snr_db: prepared.expected_snr(),
-            file_snr_db: file.snr(),
+            file_snr_db,
             common_mode: recovery.common_mode(),
             noise,
             strips: self.source.plan.strips(recovery.halo()).len(),
@@ -137,6 +153,7 @@ impl RecoverJob<'_> {
             dead_pixels: defects.dead,
             estimated_fields: findings.estimated_fields.clone(),
             file_bytes,
+            levels,
             photograph_reports: photograph_reports(
                 &folder,
                 &shots,
@@ -208,27 +225,86 @@ impl RecoverJob<'_> {
         Ok((overexposed, defects))
     }
 
-    /// Encodes the tiles in `checkpoint`. An interruption is reported as [`Cancelled`].
+    /// Encodes the tiles in `checkpoint` and writes the file. Returns its length, and its SNR relative to the tiles. An
+    /// interruption is reported as [`Cancelled`].
+    fn write(
+        &self,
+        recovery: &PreparedRecovery,
+        checkpoint: &Mutex<Checkpoint>,
+        metadata: Metadata,
+        levels: u32,
+    ) -> Result<(u64, Option<Decibels>)> {
+        let _spinner = progress::spinner("compressing");
+        let mut quality = self.args.quality();
+        let max_bytes = match quality {
+            FileQuality::MaxBytes(bytes) => bytes,
+            _ => u64::MAX,
+        };
+        if levels > 1 && max_bytes < u64::MAX {
+            quality = FileQuality::MaxBytes((LEVEL_0_SHARE * max_bytes as f64) as u64);
+        }
+        loop {
+            let file = self.encode(recovery, checkpoint, metadata.clone(), quality);
+            let file = file.map_err(|error| self.writing_error(error, max_bytes))?;
+            let output = OutputFile::create(&self.args.output, &LTM)?;
+            let written = output.finish(|out| match levels {
+                1 => Ok(file.write(out)?),
+                _ => {
+                    let layout = PyramidLayout {
+                        max_bytes,
+                        ..PyramidLayout::of_levels(levels)
+                    };
+                    let fetch = |chunk| Ok(file.chunk(chunk)?.into_owned());
+                    let (output, cores) = (&self.args.output, self.source.cores);
+                    write_levels(output, file.index(), &fetch, layout, cores, out)?;
+                    Ok(())
+                }
+            });
+            let error = match written {
+                Ok(bytes) => return Ok((bytes, file.snr())),
+                Err(error) => error,
+            };
+            match error.downcast::<FormatError>() {
+                // Coarser levels took more than their usual share.
+                Ok(FormatError::TooLarge { limit, smallest }) => {
+                    let fitting = file.bytes() as f64 * limit as f64 / smallest as f64;
+                    quality = FileQuality::MaxBytes((RETRY_SHARE * fitting) as u64);
+                }
+                Ok(error) => return Err(self.writing_error(error, max_bytes)),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Encodes the tiles in `checkpoint` as a file of one level, whose chunks are in a temporary file.
     fn encode(
         &self,
         recovery: &PreparedRecovery,
         checkpoint: &Mutex<Checkpoint>,
         metadata: Metadata,
-    ) -> Result<EncodedFile> {
-        let _spinner = progress::spinner("compressing");
+        quality: FileQuality,
+    ) -> Result<EncodedFile<SpooledChunks<File>>, FormatError> {
         let record = |i| lock(checkpoint).read(i);
-        let quality = self.args.quality();
-        let file = export::encode_file(recovery, &record, metadata, quality, self.source.cores);
-        file.map_err(|error| {
-            let output = self.args.output.display();
-            match error {
-                FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
-                FormatError::TooLarge { .. } => Error::new(error).context(format!(
+        let new_store = || temporary_spool(&self.args.output).map(SpooledChunks::new);
+        let cores = self.source.cores;
+        export::encode_file(recovery, &record, metadata, quality, cores, new_store)
+    }
+
+    /// The error with the name of the output; `max_bytes` is what the user asked for.
+    fn writing_error(&self, error: FormatError, max_bytes: u64) -> Error {
+        let output = self.args.output.display();
+        match error {
+            FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
+            FormatError::TooLarge { limit, smallest } => {
+                // A file of several levels has a smaller limit for the finest one.
+                let smallest = (smallest as f64 * max_bytes as f64 / limit as f64).ceil() as u64;
+                let limit = max_bytes;
+                Error::new(FormatError::TooLarge { limit, smallest }).context(format!(
                     "{output}: cannot be written; the recovered tiles are kept: give the same command \
                      with --resume and a larger --max-bytes, or without --max-bytes"
-                )),
-                other => Error::new(other).context(output.to_string()),
+                ))
             }
-        })
+            other => Error::new(other).context(output.to_string()),
+        }
     }
 }

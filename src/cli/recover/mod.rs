@@ -23,7 +23,8 @@ pub use self::messages::StrictError;
 pub use self::report::RecoverReport;
 
 use self::capture_sample::SampleSource;
-use self::job::RecoverJob;
+use self::job::{RecoverJob, encoded_components};
+use super::levels_output::levels_of;
 use super::output_file::{LTM, OutputFile};
 use super::process_resources::{InterruptibleCores, thread_pool};
 use super::report::print_json;
@@ -67,8 +68,11 @@ pub fn recover(
     let extents = (manifest.camera.extent(), manifest.light.extent());
     let plan = MemoryPlan::new(limit, extents, shots.len(), method, max_window, threads)
         .map_err(messages::too_little_memory)?;
+    let levels = levels_of(args.levels, manifest.camera.extent());
+    let levels = levels.with_context(|| folder.manifest_path().display().to_string())?;
     if let Some(window) = args.window {
-        let encoders = plan.tiles_encoded_at_once(window, method.max_rank(window));
+        let components = encoded_components(levels, window, method.max_rank(window));
+        let encoders = plan.tiles_encoded_at_once(window, components);
         encoders.map_err(messages::too_little_memory)?;
     }
     let job = RecoverJob {
@@ -76,6 +80,7 @@ pub fn recover(
         args,
         folder,
         shots: &shots,
+        levels,
         source: SampleSource { plan: &plan, cores },
     };
     thread_pool(plan.tiles_at_once())?.install(|| job.run())

@@ -52,6 +52,8 @@ pub struct RecoverReport {
     /// Fields of the manifest that the photographs contradict.
     pub estimated_fields: Vec<EstimatedField>,
     pub file_bytes: u64,
+    /// Number of levels of the file.
+    pub levels: u32,
     /// One for each photograph that was read.
     #[serde(rename = "photograph_table")]
     pub photograph_reports: Vec<PhotographReport>,

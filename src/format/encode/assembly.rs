@@ -1,12 +1,14 @@
 //! Assembly: tiles are quantised and compressed by the plan, and put together to a file.
 
+use std::borrow::Cow;
 use std::io::Write;
 
 use super::basis_rotation::BasisRotation;
 use super::scan_plan::SHARES;
 use super::source_analysis::{AnalysedSource, for_tiles, non_empty};
 use crate::format::checksum::checksum;
-use crate::format::chunk::{ChunkEntry, EncodedChunk};
+use crate::format::chunk::{ChunkEntry, ChunkId, EncodedChunk};
+use crate::format::chunk_store::ChunkStore;
 use crate::format::codec::basis_chunk::QuantisedBasis;
 use crate::format::codec::direct_functions::{self, QuantisedDirectFunctions};
 use crate::format::codec::half_float_codec;
@@ -26,14 +28,13 @@ const HALVES_ERROR_RATIO: f64 = 4e-8;
 
 /// A file ready to be written.
 #[derive(Clone, Debug)]
-pub struct EncodedFile {
+pub struct EncodedFile<S = Vec<Vec<u8>>> {
     pub(super) index: FileIndex,
     pub(super) index_bytes: Vec<u8>,
-    /// In file order.
-    pub(super) chunks: Vec<Vec<u8>>,
+    pub(super) chunks: S,
 }
 
-impl EncodedFile {
+impl<S: ChunkStore> EncodedFile<S> {
     /// The file index.
     pub fn index(&self) -> &FileIndex {
         &self.index
@@ -52,12 +53,23 @@ impl EncodedFile {
     /// Writes the file.
     ///
     /// # Errors
-    /// [`FormatError::Write`].
+    /// [`FormatError::Write`] and [`FormatError::Spool`].
     pub fn write(&self, out: &mut impl Write) -> Result<(), FormatError> {
-        let mut sections = std::iter::once(&self.index_bytes).chain(&self.chunks);
-        sections
-            .try_for_each(|section| out.write_all(section))
-            .map_err(FormatError::Write)
+        out.write_all(&self.index_bytes)
+            .map_err(FormatError::Write)?;
+        for chunk in self.index.chunks() {
+            out.write_all(&self.chunk(chunk)?)
+                .map_err(FormatError::Write)?;
+        }
+        Ok(())
+    }
+
+    /// The bytes of a chunk.
+    ///
+    /// # Errors
+    /// [`FormatError::Spool`].
+    pub fn chunk(&self, chunk: ChunkId) -> Result<Cow<'_, [u8]>, FormatError> {
+        self.chunks.get(self.index.chunk_number(chunk))
     }
 }
 
@@ -138,23 +150,25 @@ impl QuantisedTile {
 ///
 /// # Errors
 /// As [`EncodedFile::new`].
-pub fn encode_quantised(
+pub fn encode_quantised<S: ChunkStore>(
     analysed: &AnalysedSource<'_, impl Executor>,
     scans: Vec<ProgressiveScan>,
-) -> Result<EncodedFile, FormatError> {
+    store: S,
+) -> Result<EncodedFile<S>, FormatError> {
     let encode = |tile: FloatTile| {
         QuantisedTile::new(analysed, &analysed.rotated(tile), &scans, false).encode(&scans)
     };
-    assemble(analysed, scans.clone(), encode)
+    assemble(analysed, scans.clone(), encode, store)
 }
 
 /// Encodes all tiles as half-precision floats.
 ///
 /// # Errors
 /// As [`EncodedFile::new`].
-pub fn encode_lossless(
+pub fn encode_lossless<S: ChunkStore>(
     analysed: &AnalysedSource<'_, impl Executor>,
-) -> Result<EncodedFile, FormatError> {
+    store: S,
+) -> Result<EncodedFile<S>, FormatError> {
     // A rotated coefficient is at most the norm of the input coefficients.
     let gains = (0..analysed.rank()).filter_map(|k| Some(analysed.rotation.as_ref()?.gain(k)));
     let input_rank = analysed.source.basis.map_or(0, Basis::rank);
@@ -189,7 +203,7 @@ pub fn encode_lossless(
         }
     }
     let encode = |tile: FloatTile| encode_halves(analysed, &analysed.rotated(tile), &scans);
-    assemble(analysed, scans.clone(), encode)
+    assemble(analysed, scans.clone(), encode, store)
 }
 
 fn encode_halves(
@@ -234,34 +248,40 @@ fn quantise_basis(rotation: &BasisRotation, area: usize, error: f64) -> Quantise
 }
 
 /// Encodes all tiles by `encode`, and puts the file together.
-fn assemble(
+fn assemble<S: ChunkStore>(
     analysed: &AnalysedSource<'_, impl Executor>,
     mut scans: Vec<ProgressiveScan>,
     encode: impl Fn(FloatTile) -> Result<EncodedTile, FormatError> + Sync + Send,
-) -> Result<EncodedFile, FormatError> {
+    mut store: S,
+) -> Result<EncodedFile<S>, FormatError> {
     let (source, rotation) = (&analysed.source, analysed.rotation.as_ref());
     let geometry = &source.geometry;
     let (tiles, area) = (geometry.tile_grid().area(), geometry.window.area());
-    let mut chunks = vec![Vec::with_capacity(tiles); scans.len()];
+    let mut entries = vec![ChunkEntry::default(); scans.len() * tiles];
     // Every prefix lacks the dropped components.
     let kept = rotation.map_or(0.0, BasisRotation::energy);
     let mut errors = vec![(analysed.coefficient_energy - kept).max(0.0); scans.len()];
-    for_tiles(source, analysed.executor, encode, |_, tile| {
+    for_tiles(source, analysed.executor, encode, |i, tile| {
         let tile = tile?;
         for (sum, error) in errors.iter_mut().zip(&tile.errors) {
             *sum += error;
         }
-        for (chunks, chunk) in chunks.iter_mut().zip(tile.chunks) {
-            chunks.push(chunk);
+        for (scan, chunk) in tile.chunks.into_iter().enumerate() {
+            entries[scan * tiles + i] = ChunkEntry {
+                bytes: chunk.bytes.len() as u32, // below 2^25
+                content_bytes: chunk.content_bytes,
+                crc: checksum(&chunk.bytes),
+            };
+            if !chunk.bytes.is_empty() {
+                store.put(scan * (tiles + 1) + i + 1, chunk.bytes)?;
+            }
         }
         Ok(())
     })?;
     let error = errors.last().copied().unwrap_or(0.0);
     let basis = rotation.map(|rotation| (rotation, quantise_basis(rotation, area, error)));
     let (mut known, mut basis_error) = (0, 0.0);
-    let mut in_file = Vec::new();
-    let mut entries = Vec::with_capacity(scans.len() * tiles);
-    for ((scan, chunks), error) in scans.iter_mut().zip(chunks).zip(errors) {
+    for (number, (scan, error)) in scans.iter_mut().zip(errors).enumerate() {
         let functions = scan.new_basis_functions(known);
         if let Some((rotation, quantised)) = &basis
             && functions > 0
@@ -274,21 +294,13 @@ fn assemble(
             known += functions;
             scan.basis_bytes = bytes.len() as u32; // below 2^24
             scan.basis_crc = checksum(&bytes);
-            in_file.push(bytes);
+            store.put(number * (tiles + 1), bytes)?;
         }
         let error = SnrAccumulator {
             signal: analysed.energy,
             error: error + basis_error,
         };
         scan.snr = Decibels(f64::from(error.finite_snr().0 as f32));
-        for chunk in chunks {
-            entries.push(ChunkEntry {
-                bytes: chunk.bytes.len() as u32, // below 2^25
-                content_bytes: chunk.content_bytes,
-                crc: checksum(&chunk.bytes),
-            });
-            in_file.push(chunk.bytes);
-        }
     }
     let extensions = source.extensions.clone();
     let metadata = MetadataText::encode(&source.metadata)?;
@@ -297,6 +309,6 @@ fn assemble(
     Ok(EncodedFile {
         index,
         index_bytes,
-        chunks: in_file,
+        chunks: store,
     })
 }

@@ -13,6 +13,7 @@ use super::scan_costs::RateDistortionModel;
 use super::scan_plan::{self, ByteShareLimits, MAX_SHARES, ProgressiveScanPlan, SHARES};
 use super::source_analysis::AnalysedSource;
 use crate::bisect::bisect;
+use crate::format::chunk_store::ChunkStore;
 use crate::format::constants::FIRST_BYTES;
 use crate::format::error::FormatError;
 use crate::format::scan::ProgressiveScan;
@@ -43,7 +44,7 @@ const RETRY_SHARE_FACTORS: [f64; 2] = [0.75, 0.5];
 const USUAL_METADATA_BYTES: u64 = 1024;
 
 impl EncodedFile {
-    /// Encodes a whole file. The result does not depend on the number of threads.
+    /// Encodes a whole file in memory. The result does not depend on the number of threads.
     ///
     /// # Errors
     /// [`FormatError::InvalidGeometry`], [`FormatError::TooMany`] basis functions or scans, [`FormatError::Source`] if a
@@ -57,15 +58,7 @@ impl EncodedFile {
         target: EncodingTarget<'_>,
         executor: &impl Executor,
     ) -> Result<Self, FormatError> {
-        let analysed = AnalysedSource::new(source, executor)?;
-        match target {
-            EncodingTarget::Snr(snr) => RateController::new(analysed)?.encode_to_snr(snr),
-            EncodingTarget::Bytes(limit) => RateController::new(analysed)?.encode_to_size(limit),
-            EncodingTarget::Loss(loss, metric) => {
-                RateController::new(analysed)?.encode_to_loss(loss, metric)
-            }
-            EncodingTarget::Lossless => assembly::encode_lossless(&analysed),
-        }
+        Self::new_in(|| Ok(Vec::new()), source, target, executor)
     }
 
     /// Encodes a file with the quantisation step of another: for the shards of a picture, which are then equally accurate.
@@ -80,25 +73,64 @@ impl EncodedFile {
         step: f32,
         executor: &impl Executor,
     ) -> Result<Self, FormatError> {
-        let mut controller = RateController::new(AnalysedSource::new(source, executor)?)?;
+        let analysed = AnalysedSource::new(source, executor)?;
+        let mut controller = RateController::new(analysed, || Ok(Vec::new()))?;
         let is_lit = controller.trial_error(step).signal > 0.0;
         controller.encode_with_step(is_lit.then_some(step))
     }
 }
 
-/// The search for a file's step and rank.
-struct RateController<'a, E> {
-    analysed: AnalysedSource<'a, E>,
-    sample: Vec<SampledTilePart>,
+impl<S: ChunkStore> EncodedFile<S> {
+    /// As [`new`](EncodedFile::new), with the chunks in a store of the caller's. `new_store` is called for each attempt to
+    /// reach the target, of which up to three are kept at a time.
+    ///
+    /// # Errors
+    /// Those of [`new`](EncodedFile::new), of `new_store` and of the stores.
+    ///
+    /// # Panics
+    /// As [`new`](EncodedFile::new).
+    pub fn new_in(
+        new_store: impl Fn() -> Result<S, FormatError> + Sync,
+        source: EncoderInput<'_>,
+        target: EncodingTarget<'_>,
+        executor: &impl Executor,
+    ) -> Result<Self, FormatError> {
+        let analysed = AnalysedSource::new(source, executor)?;
+        let controller = |analysed| RateController::new(analysed, &new_store);
+        match target {
+            EncodingTarget::Snr(snr) => controller(analysed)?.encode_to_snr(snr),
+            EncodingTarget::Bytes(limit) => controller(analysed)?.encode_to_size(limit),
+            EncodingTarget::Loss(loss, metric) => {
+                controller(analysed)?.encode_to_loss(loss, metric)
+            }
+            EncodingTarget::Lossless => assembly::encode_lossless(&analysed, new_store()?),
+        }
+    }
 }
 
-impl<'a, E: Executor> RateController<'a, E> {
-    fn new(analysed: AnalysedSource<'a, E>) -> Result<Self, FormatError> {
+/// The search for a file's step and rank.
+struct RateController<'a, E, N> {
+    analysed: AnalysedSource<'a, E>,
+    sample: Vec<SampledTilePart>,
+    new_store: N,
+}
+
+impl<'a, E, S, N> RateController<'a, E, N>
+where
+    E: Executor,
+    S: ChunkStore,
+    N: Fn() -> Result<S, FormatError> + Sync,
+{
+    fn new(analysed: AnalysedSource<'a, E>, new_store: N) -> Result<Self, FormatError> {
         let sample = sample(&analysed)?;
-        Ok(Self { analysed, sample })
+        Ok(Self {
+            analysed,
+            sample,
+            new_store,
+        })
     }
 
-    fn encode_to_snr(&mut self, snr: Decibels) -> Result<EncodedFile, FormatError> {
+    fn encode_to_snr(&mut self, snr: Decibels) -> Result<EncodedFile<S>, FormatError> {
         self.encode_with_step(step_for(snr, |step| self.trial_error(step)))
     }
 
@@ -106,7 +138,7 @@ impl<'a, E: Executor> RateController<'a, E> {
         &mut self,
         max_loss: Decibels,
         metric: &dyn DistortionMetric,
-    ) -> Result<EncodedFile, FormatError> {
+    ) -> Result<EncodedFile<S>, FormatError> {
         let analysed = &mut self.analysed;
         let pixels = analysed.source.geometry.camera.area() as f64;
         // The step at which nothing is left.
@@ -129,7 +161,7 @@ impl<'a, E: Executor> RateController<'a, E> {
         self.encode_with_step(Some((coarsest * exp2(exponent)) as f32))
     }
 
-    fn encode_to_size(&mut self, limit: u64) -> Result<EncodedFile, FormatError> {
+    fn encode_to_size(&mut self, limit: u64) -> Result<EncodedFile<S>, FormatError> {
         let rotation = self.analysed.rotation.clone();
         let mut try_snr = |snr: f64| {
             self.analysed.rotation.clone_from(&rotation);
@@ -153,9 +185,9 @@ impl<'a, E: Executor> RateController<'a, E> {
 
     /// Encodes all tiles; without a step there is no light. Plans anew with smaller shares if the file exceeds
     /// [`MAX_SHARES`]: predictions from samples may err.
-    fn encode_with_step(&mut self, step: Option<f32>) -> Result<EncodedFile, FormatError> {
+    fn encode_with_step(&mut self, step: Option<f32>) -> Result<EncodedFile<S>, FormatError> {
         let Some(step) = step else {
-            return assembly::encode_quantised(&self.analysed, Vec::new());
+            return assembly::encode_quantised(&self.analysed, Vec::new(), (self.new_store)()?);
         };
         let expected = self.trial_error(step);
         drop_weak_components(&mut self.analysed, expected);
@@ -163,7 +195,7 @@ impl<'a, E: Executor> RateController<'a, E> {
         let encode = |factor: f64| {
             let ProgressiveScanPlan { scans, first_scans } =
                 self.plan(&model, step, expected.error, factor)?;
-            let file = assembly::encode_quantised(&self.analysed, scans)?;
+            let file = assembly::encode_quantised(&self.analysed, scans, (self.new_store)()?)?;
             let is_within = is_within_shares(&file, first_scans);
             Ok::<_, FormatError>((file, is_within))
         };
@@ -225,7 +257,7 @@ impl<'a, E: Executor> RateController<'a, E> {
 }
 
 /// Whether the index with the first `first_scans` scans, and every later scan, keep [`MAX_SHARES`] of the file.
-fn is_within_shares(file: &EncodedFile, first_scans: usize) -> bool {
+fn is_within_shares(file: &EncodedFile<impl ChunkStore>, first_scans: usize) -> bool {
     let index = file.index();
     let file_bytes = usual_bytes(file, file.bytes()) as f64;
     let share = |bytes: u64| bytes as f64 / file_bytes;
@@ -238,7 +270,7 @@ fn is_within_shares(file: &EncodedFile, first_scans: usize) -> bool {
 }
 
 /// The first `bytes` of a file, if it had metadata of [`USUAL_METADATA_BYTES`].
-fn usual_bytes(file: &EncodedFile, bytes: u64) -> u64 {
+fn usual_bytes(file: &EncodedFile<impl ChunkStore>, bytes: u64) -> u64 {
     bytes - u64::from(file.index().header.metadata.bytes) + USUAL_METADATA_BYTES
 }
 

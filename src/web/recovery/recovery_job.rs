@@ -162,7 +162,14 @@ impl Recovery {
         let metadata = self.metadata();
         let file = ReportingExecutor::run(on_job, |executor| {
             let record = |i| self.record(i);
-            export::encode_file(self.recovery(), &record, metadata, quality, executor)
+            export::encode_file(
+                self.recovery(),
+                &record,
+                metadata,
+                quality,
+                executor,
+                || Ok(Vec::new()),
+            )
         })?;
         let mut bytes = Vec::new();
         let length = usize::try_from(file.bytes()).map_err(|_| out_of_memory())?;

@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use crate::format::FormatError;
+use super::error::FormatError;
 
 /// Bytes that are copied at a time.
 const COPY_BYTES: u64 = 1 << 20;
@@ -29,7 +29,7 @@ impl<F: Read + Write + Seek> Spool<F> {
     ///
     /// # Errors
     /// [`FormatError::Spool`].
-    pub(super) fn append(
+    pub(crate) fn append(
         &self,
         write: impl FnOnce(&mut F) -> io::Result<()>,
     ) -> Result<Range<u64>, FormatError> {
@@ -45,7 +45,7 @@ impl<F: Read + Write + Seek> Spool<F> {
     }
 
     /// The bytes at `range`.
-    pub(super) fn read(&self, range: Range<u64>) -> io::Result<Vec<u8>> {
+    pub(crate) fn read(&self, range: Range<u64>) -> io::Result<Vec<u8>> {
         let mut bytes = vec![0; (range.end - range.start) as usize];
         let mut spool = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         spool.file.seek(SeekFrom::Start(range.start))?;
@@ -57,7 +57,7 @@ impl<F: Read + Write + Seek> Spool<F> {
     ///
     /// # Errors
     /// [`FormatError::Spool`] and [`FormatError::Write`].
-    pub(super) fn copy(&self, range: Range<u64>, out: &mut impl Write) -> Result<(), FormatError> {
+    pub(crate) fn copy(&self, range: Range<u64>, out: &mut impl Write) -> Result<(), FormatError> {
         let (mut at, end) = (range.start, range.end);
         while at < end {
             let next = end.min(at + COPY_BYTES);
@@ -69,7 +69,7 @@ impl<F: Read + Write + Seek> Spool<F> {
     }
 
     /// Forgets all records.
-    pub(super) fn clear(&self) {
+    pub(crate) fn clear(&self) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).end = 0;
     }
 }
