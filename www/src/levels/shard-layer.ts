@@ -23,8 +23,14 @@ export type LayerChangeEvent = CustomEvent<PhotoError | null>;
 export class ShardLayer {
   /** Lies over the root's canvas, in the box of the picture, which is moved and magnified. */
   readonly element = document.createElement('div');
-  /** Its pixels are those of level 0. */
   readonly #plane = document.createElement('div');
+  /**
+   * The level whose pixels are those of the plane: the finest that is shown. Browsers are slow to draw a canvas that is
+   * magnified by its size and reduced by a transform.
+   */
+  #level = 0;
+  /** In the page. */
+  #size: Pick<DOMRectReadOnly, 'width' | 'height'> = { width: 0, height: 0 };
   readonly #resizes: ResizeObserver;
   readonly #moves: MutationObserver;
   readonly #visibility: IntersectionObserver;
@@ -82,23 +88,30 @@ export class ShardLayer {
   }
 
   /** Shows these, and no others. */
-  show(shards: Iterable<PlacedShard>): void {
+  show(shards: ReadonlySet<PlacedShard>): void {
     const shown = new Set<Node>();
+    const level = Math.min(...[...shards].map(({ id }) => id.level));
+    const isMoved = shards.size > 0 && level !== this.#level;
+    if (isMoved) {
+      this.#level = level;
+      this.#fit();
+    }
+    const unit = 2 ** this.#level;
     for (const { id, rect, canvas } of shards) {
       if (!canvas) continue;
       shown.add(canvas);
-      if (canvas.parentNode === this.#plane) continue;
-      const side = 2 ** id.level;
+      if (canvas.parentNode === this.#plane && !isMoved) continue;
+      const side = 2 ** id.level / unit;
       Object.assign(canvas.style, {
         position: 'absolute',
-        left: `${rect.left}px`,
-        top: `${rect.top}px`,
+        left: `${rect.left / unit}px`,
+        top: `${rect.top / unit}px`,
         width: `${canvas.width * side}px`,
         height: `${canvas.height * side}px`,
         // Finer ones lie over coarser ones.
         zIndex: String(-id.level),
       });
-      this.#plane.append(canvas);
+      if (canvas.parentNode !== this.#plane) this.#plane.append(canvas);
     }
     for (const canvas of [...this.#plane.childNodes]) if (!shown.has(canvas)) canvas.remove();
   }
@@ -144,13 +157,20 @@ export class ShardLayer {
   }
 
   /** Fits into the box of the picture, and follows it. */
-  #follow({ width, height }: Pick<DOMRectReadOnly, 'width' | 'height'>): void {
-    const { table } = this;
+  #follow(size: Pick<DOMRectReadOnly, 'width' | 'height'>): void {
     const { parentElement: content } = this.element;
-    this.#plane.style.transform = `scale(${width / table.width}, ${height / table.height})`;
+    this.#size = size;
+    this.#fit();
     if (content) this.#moves.observe(content, { attributeFilter: ['style'] });
     if (content?.parentElement) this.#visibility.observe(content.parentElement);
     this.requestFrame();
+  }
+
+  #fit(): void {
+    const { width, height } = this.table;
+    const unit = 2 ** this.#level;
+    const [across, down] = [this.#size.width / width, this.#size.height / height];
+    this.#plane.style.transform = `scale(${across * unit}, ${down * unit})`;
   }
 
   #dispatch(detail: PhotoError | null): void {

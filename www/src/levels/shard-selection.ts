@@ -21,10 +21,10 @@ export interface ShardSelection {
   readonly isComplete: boolean;
 }
 
-/** Coarser by this many levels comes first: a sixteenth of the bytes. */
-const COARSE_STEPS = 2;
-
-/** A view that needs more than `maxShards` gets a coarser level; with `isCoarse` the one after it, once that is in memory. */
+/**
+ * A view that needs more than `maxShards` gets a coarser level. The level after it comes first, as it has a quarter of the
+ * bytes, and stays: with `isCoarse` a frame has that.
+ */
 export function selectShards(
   table: LevelTable,
   { rect, scale }: Pick<PictureView, 'rect' | 'scale'>,
@@ -41,10 +41,9 @@ export function selectShards(
     shards = table.shardsIn(level, rect);
   }
   const isComplete = shards.every(isLoaded);
-  const coarse = isComplete ? [] : table.shardsIn(level + COARSE_STEPS, rect);
-  const next = isCoarse ? table.shardsIn(level + 1, rect) : [];
-  const needed = [...coarse, ...next, ...nearestFirst(table, shards, rect)];
-  const isNext = isCoarse && level < root && next.every(isLoaded);
+  const coarse = table.shardsIn(level + 1, rect);
+  const needed = [...coarse, ...nearestFirst(table, shards, rect)];
+  const isNext = isCoarse && level < root && coarse.every(isLoaded);
   return isNext ? { level: level + 1, needed, isComplete: true } : { level, needed, isComplete };
 }
 
