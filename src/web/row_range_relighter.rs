@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::{CodedError, Photo, WebOutputTransform};
 use crate::job_executor::SequentialExecutor;
 use crate::relight::cpu::{self, CpuRelighter, STRIP_ROWS};
-use crate::transport::{CHANNELS, Extent, TileRect};
+use crate::transport::{CHANNELS, Extent, ShardOrigin, TileRect};
 
 /// Relights a row range of a photograph. Only its tiles are needed.
 #[wasm_bindgen]
@@ -106,6 +106,10 @@ impl RowRangeRelighter {
             }
         }
         self.relighter.update(&SequentialExecutor);
+        // A view has a dozen shards, which are relit one after another.
+        if self.relighter.transport().geometry.correspondence.origin != ShardOrigin::ZERO {
+            self.relighter.release_scratch();
+        }
         let TileRect { y, extent, .. } = self.relighter.view();
         let rows = self.rows.start.max(y)..self.rows.end.min(y + extent.height);
         let mut strip = vec![[0; 4]; STRIP_ROWS.min(rows.len()) * width as usize];

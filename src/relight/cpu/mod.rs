@@ -194,6 +194,11 @@ impl CpuRelighter {
         self.light.clear_changes();
     }
 
+    /// Frees the memory that is kept from frame to frame to compute in.
+    pub fn release_scratch(&self) {
+        *lock(&self.scratch_pool) = Vec::new();
+    }
+
     #[inline(always)]
     fn relight_block<S: Simd>(
         &self,

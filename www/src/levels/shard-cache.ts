@@ -10,8 +10,8 @@ export interface CachedShard {
   evict(): void;
 }
 
-const MAX_BYTES = 160 * 2 ** 20;
-const MAX_BYTES_PER_GIB = 40 * 2 ** 20;
+const MAX_BYTES = 144 * 2 ** 20;
+const MAX_BYTES_PER_GIB = 36 * 2 ** 20;
 
 export class ShardCache {
   /** The least recently seen first. */

@@ -18,21 +18,26 @@ test('the level has about one pixel for each device pixel', () => {
   assert.deepEqual([4, 1, 0.75, 0.6, 0.5, 0.3, 0.01].map(level), [0, 0, 0, 1, 1, 2, 5]);
 });
 
-test('a coarser level comes first, and then the shards from the middle outwards', () => {
+test('the next coarser level comes first, and then the shards from the middle outwards', () => {
   const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), NONE, 40, false);
-  const [first, second, ...others] = needed;
-  assert.deepEqual(first, { level: 2, x: 0, y: 0 });
-  assert.deepEqual(second, { level: 0, x: 1, y: 1 });
+  assert.deepEqual(new Set(needed.slice(0, 4).map(({ level }) => level)), new Set([1]));
+  const [first, ...others] = needed.slice(4);
+  assert.deepEqual(first, { level: 0, x: 1, y: 1 });
   assert.equal(others.length, 8);
   assert.equal(isComplete, false);
   const corners = others.slice(4).map(({ x, y }) => x !== 1 && y !== 1);
   assert.deepEqual(corners, [true, true, true, true]);
 });
 
-test('once all shards are there, no coarser one is needed', () => {
-  const { needed, isComplete } = selectShards(TABLE, view(100, 100, 1400, 1), ALL, 40, false);
-  assert.equal(needed.length, 9);
-  assert.equal(isComplete, true);
+test('once all shards are there, the coarser level stays if there is room', () => {
+  const coarse = (maxShards: number) => {
+    const chosen = selectShards(TABLE, view(100, 100, 1400, 1), ALL, maxShards, true);
+    assert.equal(chosen.isComplete, true);
+    return [chosen.needed.length, chosen.level];
+  };
+  assert.deepEqual(coarse(13), [13, 1]);
+  assert.deepEqual(coarse(12), [12, 1]);
+  assert.equal(selectShards(TABLE, view(100, 100, 1400, 1), ALL, 12, false).needed.length, 9);
 });
 
 test('a frame of less quality has a coarser level, once that is there', () => {
@@ -55,9 +60,9 @@ test('a frame of less quality has a coarser level, once that is there', () => {
   assert.equal(selectShards(TABLE, view(0, 0, 16384, 1 / 64), NONE, 40, true).level, 5);
 });
 
-test('two levels before the root, nothing comes first', () => {
-  const { needed } = selectShards(TABLE, view(0, 0, 16384, 1 / 8), NONE, 40, false);
-  assert.deepEqual(new Set(needed.map(({ level }) => level)), new Set([3]));
+test('before the root, nothing comes first', () => {
+  const { needed } = selectShards(TABLE, view(0, 0, 16384, 1 / 16), NONE, 40, false);
+  assert.deepEqual(new Set(needed.map(({ level }) => level)), new Set([4]));
   assert.deepEqual(selectShards(TABLE, view(0, 0, 16384, 1 / 64), NONE, 40, false).needed, []);
 });
 

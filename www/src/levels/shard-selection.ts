@@ -23,7 +23,7 @@ export interface ShardSelection {
 
 /**
  * A view that needs more than `maxShards` gets a coarser level. The level after it comes first, as it has a quarter of the
- * bytes, and stays: with `isCoarse` a frame has that.
+ * bytes, and stays if there is room: with `isCoarse` a frame has that, for which others make room.
  */
 export function selectShards(
   table: LevelTable,
@@ -42,7 +42,10 @@ export function selectShards(
   }
   const isComplete = shards.every(isLoaded);
   const coarse = table.shardsIn(level + 1, rect);
-  const needed = [...coarse, ...nearestFirst(table, shards, rect)];
+  const hasRoom = shards.length + coarse.length <= maxShards;
+  const first = hasRoom || isCoarse || !isComplete ? coarse : [];
+  const fine = nearestFirst(table, shards, rect);
+  const needed = [...first, ...fine.slice(0, isCoarse ? maxShards - coarse.length : undefined)];
   const isNext = isCoarse && level < root && coarse.every(isLoaded);
   return isNext ? { level: level + 1, needed, isComplete: true } : { level, needed, isComplete };
 }
