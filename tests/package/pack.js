@@ -34,7 +34,7 @@ const SCRIPTS = [
   ...['fr', 'de', 'it', 'es', 'ja', 'zh', 'zh-hant'].map(
     (language) => `relightable-photo-${language}`,
   ),
-  ...['index', 'element', 'core', 'recover'],
+  ...['index', 'element', 'core', 'recover', 'openseadragon'],
 ];
 const CORE_MODULES = ['decoder', 'cpu'];
 const MODULES = [...CORE_MODULES, 'webgl2', 'webgpu', 'recovery', 'capture_reader'];

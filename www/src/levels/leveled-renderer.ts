@@ -62,6 +62,8 @@ export class LeveledRenderer implements Renderer {
   readonly #loader: ShardLoader;
   readonly #shards = new Map<string, Shard>();
   #shown = new Set<Shard>();
+  /** Those in memory that the view needs; others may be freed. */
+  #kept: ReadonlySet<Shard> = new Set();
   /** The codes of errors of loads that were reported. */
   readonly #reported = new Set<string>();
   /** Replaced by finer ones, and on the screen until these are drawn. */
@@ -121,7 +123,7 @@ export class LeveledRenderer implements Renderer {
       for (const shard of this.#shown) if (!shown.has(shard)) shard.forget();
       this.#shown = shown;
       this.#layer.show(shown);
-      cache.show(this, shown);
+      cache.show(this, shown, this.#kept);
       // A shard that was replaced during the frame is shown until the next frame.
       for (const shard of this.#outgoing) {
         if (shown.has(shard)) continue;
@@ -164,7 +166,7 @@ export class LeveledRenderer implements Renderer {
   /** Nobody sees the picture: its shards may be freed. */
   #hide(): void {
     this.#loader.request([]);
-    cache.show(this, new Set());
+    cache.show(this, [], new Set());
   }
 
   /** Gives the shards of the view that are in memory, and loads the others. */
@@ -179,13 +181,18 @@ export class LeveledRenderer implements Renderer {
     const limit = Math.max(maxShards, MIN_SHARDS);
     const selection = selectShards(this.#table, view, isLoaded, limit, isCoarse);
     const { needed } = selection;
+    if (selection.isPending) this.qualityController.discardFrames();
     const bytes = cache.maxBytes / Math.max(needed.length, MIN_SHARDS);
-    this.#quads = Math.max(1, Math.floor((bytes / pixels - BYTES_PER_PIXEL) / QUAD_BYTES));
+    const quads = Math.max(1, (bytes / pixels - BYTES_PER_PIXEL) / QUAD_BYTES);
+    // Of few sizes, so that a shard takes the place of another in memory that never shrinks.
+    this.#quads = 2 ** Math.floor(Math.log2(quads));
     const isShown = ({ id, rect }: Shard) =>
       overlap(rect, view.rect) && (id.level === selection.level || !selection.isComplete);
     const shown = new Set([...this.#shards.values()].filter(isShown));
-    // Those on the screen stay until the others are drawn.
-    cache.show(this, new Set([...this.#shown, ...shown]));
+    const keys = new Set(needed.map(keyOf));
+    this.#kept = new Set([...this.#shards.values()].filter(({ id }) => keys.has(keyOf(id))));
+    // Those on the screen stay until the others are drawn, if there is room.
+    cache.show(this, [...this.#shown, ...shown], this.#kept);
     this.#loader.request(needed.filter((id) => !isLoaded(id) || this.#mayBeFiner(id)));
     return shown;
   }

@@ -17,23 +17,33 @@ function createCache() {
 test('the least recently seen go first', () => {
   const { cache, add, evicted } = createCache();
   const [a, b] = [add('a'), add('b')];
-  cache.show('element', new Set([b]));
-  cache.show('element', new Set([a]));
+  cache.show('element', [b], new Set([b]));
+  cache.show('element', [a], new Set([a]));
   const c = add('c');
-  cache.show('element', new Set([c]));
+  cache.show('element', [c], new Set([c]));
   assert.deepEqual(evicted, ['b']);
 });
 
-test('what any element shows stays', () => {
+test('what an element shows and does not need stays only if there is room', () => {
   const { cache, add, evicted } = createCache();
   const [a, b] = [add('a'), add('b')];
-  cache.show('one', new Set([a, b]));
+  cache.show('element', [a, b], new Set([b]));
+  assert.deepEqual(evicted, []);
   const c = add('c');
-  cache.show('other', new Set([c]));
+  cache.show('element', [a, b, c], new Set([b, c]));
+  assert.deepEqual(evicted, ['a']);
+});
+
+test('what any element needs stays', () => {
+  const { cache, add, evicted } = createCache();
+  const [a, b] = [add('a'), add('b')];
+  cache.show('one', [a, b], new Set([a, b]));
+  const c = add('c');
+  cache.show('other', [c], new Set([c]));
   assert.deepEqual(evicted, []);
   cache.delete(a);
   cache.remove('one');
   const d = add('d');
-  cache.show('other', new Set([c, d]));
+  cache.show('other', [c, d], new Set([c, d]));
   assert.deepEqual(evicted, ['b']);
 });

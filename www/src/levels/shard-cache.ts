@@ -16,8 +16,8 @@ const MAX_BYTES_PER_GIB = 36 * 2 ** 20;
 export class ShardCache {
   /** The least recently seen first. */
   readonly #shards = new Set<CachedShard>();
-  /** Those that an element shows. */
-  readonly #shown = new Map<unknown, ReadonlySet<CachedShard>>();
+  /** Those that an element needs. */
+  readonly #kept = new Map<unknown, ReadonlySet<CachedShard>>();
 
   constructor(readonly maxBytes = memoryLimit(MAX_BYTES, MAX_BYTES_PER_GIB)) {}
 
@@ -25,9 +25,9 @@ export class ShardCache {
     this.#shards.add(shard);
   }
 
-  /** `owner` shows these, and no others. */
-  show(owner: unknown, shards: ReadonlySet<CachedShard>): void {
-    this.#shown.set(owner, shards);
+  /** `owner` shows these, and no others. Those of `kept` are not freed. */
+  show(owner: unknown, shards: Iterable<CachedShard>, kept: ReadonlySet<CachedShard>): void {
+    this.#kept.set(owner, kept);
     for (const shard of shards) {
       this.#shards.delete(shard);
       this.#shards.add(shard);
@@ -41,7 +41,7 @@ export class ShardCache {
 
   /** `owner` is gone, with its shards. */
   remove(owner: unknown): void {
-    this.#shown.delete(owner);
+    this.#kept.delete(owner);
   }
 
   #makeRoom(): void {
@@ -49,7 +49,7 @@ export class ShardCache {
     for (const { bytes } of this.#shards) excess += bytes;
     for (const shard of [...this.#shards]) {
       if (excess <= 0) return;
-      if ([...this.#shown.values()].some((shown) => shown.has(shard))) continue;
+      if ([...this.#kept.values()].some((kept) => kept.has(shard))) continue;
       excess -= shard.bytes;
       this.#shards.delete(shard);
       shard.evict();

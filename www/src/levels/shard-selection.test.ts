@@ -45,11 +45,11 @@ test('a frame of less quality has a coarser level, once that is there', () => {
     selectShards(TABLE, view(100, 100, 1400, 1), isLoaded, 40, true);
   const before = frame(({ level }) => level === 0);
   assert.equal(before.level, 0);
-  assert.equal(before.isComplete, true);
+  assert.deepEqual([before.isComplete, before.isPending], [true, true]);
   assert.equal(before.needed.filter(({ level }) => level === 1).length, 4);
   const after = frame(({ level }) => level === 1);
   assert.equal(after.level, 1);
-  assert.equal(after.isComplete, true);
+  assert.deepEqual([after.isComplete, after.isPending], [true, false]);
   assert.equal(
     after.needed.filter(({ level }) => level === 0).length,
     9,

@@ -19,6 +19,8 @@ export interface ShardSelection {
   readonly needed: readonly ShardId[];
   /** Whether all shards of the level are in memory. */
   readonly isComplete: boolean;
+  /** Whether the coarser level that was asked for is not in memory yet. */
+  readonly isPending: boolean;
 }
 
 /**
@@ -46,8 +48,10 @@ export function selectShards(
   const first = hasRoom || isCoarse || !isComplete ? coarse : [];
   const fine = nearestFirst(table, shards, rect);
   const needed = [...first, ...fine.slice(0, isCoarse ? maxShards - coarse.length : undefined)];
-  const isNext = isCoarse && level < root && coarse.every(isLoaded);
-  return isNext ? { level: level + 1, needed, isComplete: true } : { level, needed, isComplete };
+  if (!isCoarse || level === root) return { level, needed, isComplete, isPending: false };
+  const isPending = !coarse.every(isLoaded);
+  if (isPending) return { level, needed, isComplete, isPending };
+  return { level: level + 1, needed, isComplete: true, isPending };
 }
 
 /** Whether two parts of the picture have pixels in common. */

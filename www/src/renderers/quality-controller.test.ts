@@ -76,6 +76,20 @@ test('with another factor, quality changes by that', () => {
   assert.deepEqual(new Set(shares.slice(40)), new Set([1 / 16, 1 / 4, 1]));
 });
 
+test('a lower quality that is not there yet is waited for', () => {
+  const slow = new QualityController(4);
+  const waiting = animate(slow);
+  waiting.frames(8, () => 100);
+  assert.equal(slow.quality, 1 / 4);
+  for (let frame = 0; frame < 50; frame += 1) {
+    slow.discardFrames();
+    waiting.frames(1, () => 100);
+  }
+  assert.equal(slow.quality, 1 / 4);
+  waiting.frames(100, linear(100));
+  assert.equal(slow.quality, 1 / 4);
+});
+
 test('outliers change nothing', () => {
   const controller = new QualityController();
   const { frames, shares } = animate(controller);

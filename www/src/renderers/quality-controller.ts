@@ -66,6 +66,11 @@ export class QualityController {
     if (this.#durations.length === WINDOW_FRAMES) this.#durations.shift();
   }
 
+  /** The last frames did not have their quality yet: they say nothing about it. */
+  discardFrames(): void {
+    this.#durations = [];
+  }
+
   #decide(ms: number): void {
     const drop = this.#drop;
     this.#drop = null;

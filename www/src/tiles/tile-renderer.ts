@@ -60,7 +60,7 @@ export class TileRenderer {
       this.#tiles.set(key, tile);
       this.#cache.add(tile);
     }
-    this.#cache.show(this, new Set([tile]));
+    this.#cache.show(this, [tile], new Set([tile]));
     try {
       return await tile.draw(frame);
     } catch (thrown) {
