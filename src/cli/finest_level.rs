@@ -27,7 +27,7 @@ pub struct FinestLevel {
     pub snr: Option<Decibels>,
     pub metadata: MetadataText,
     pub file_bytes: u64,
-    /// Bytes read; fewer than `file_bytes` for a prefix.
+    /// Bytes that it is read from; fewer than `file_bytes` for a prefix.
     pub read_bytes: u64,
     /// Scans that are complete in the bytes read.
     pub read_scans: usize,
@@ -73,7 +73,7 @@ impl FinestLevel {
         };
         let index = reader.index(first, &mut fetch).with_context(name)?;
         Ok(Self {
-            geometry: reader.geometry(0, fetch).with_context(name)?,
+            geometry: reader.finest_geometry(fetch).with_context(name)?,
             // All shards of level 0 have the scans of the file that they were copied from.
             snr: index.scans.last().map(|scan| scan.snr),
             metadata: reader.root().metadata.clone(),

@@ -122,9 +122,17 @@ pub fn shard(geometry: &Geometry, rect: TileRect) -> Geometry {
     }
 }
 
-/// The geometry of a level of `camera` pixels and `light` elements, from those of all its shards: the inverse of [`shard`].
-pub fn whole(camera: Extent, light: Extent, shards: &[Geometry]) -> Option<Geometry> {
-    let first = shards.first()?;
+/// The geometry of a level of `camera` pixels and `light` elements, from those of all its shards, at least one: the inverse of
+/// [`shard`].
+///
+/// # Errors
+/// [`GeometryError::Displacement`] if the control points do not fit together.
+pub fn whole(
+    camera: Extent,
+    light: Extent,
+    shards: &[Geometry],
+) -> Result<Geometry, GeometryError> {
+    let first = shards.first().ok_or(GeometryError::Displacement)?;
     let grids = shards.iter().filter_map(|shard| {
         let Correspondence {
             displacement,
@@ -151,13 +159,13 @@ pub fn whole(camera: Extent, light: Extent, shards: &[Geometry]) -> Option<Geome
     let displacement = displacement.map(|(grid, points, codes)| {
         DisplacementGrid::new(grid.spacing(), grid.step(), points, codes)
     });
-    Some(Geometry {
+    Ok(Geometry {
         camera,
         light,
         window: first.window,
         correspondence: Correspondence {
             affine: first.correspondence.affine,
-            displacement: displacement.and_then(Result::ok).map(Into::into),
+            displacement: displacement.transpose()?.map(Into::into),
             origin: ShardOrigin::ZERO,
         },
         tile_side: first.tile_side,

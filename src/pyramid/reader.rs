@@ -92,35 +92,25 @@ impl PyramidReader {
         Ok(reader.index().cloned().ok_or_else(|| reader.truncated())?)
     }
 
-    /// The geometry of a level. `fetch` gives bytes of the file.
+    /// The geometry of level 0. `fetch` gives bytes of the file.
     ///
     /// # Errors
-    /// The errors of `fetch`, and a [`FormatError`] if a shard is damaged or there is no such level.
-    pub fn geometry<E: From<FormatError>>(
+    /// The errors of `fetch`, and a [`FormatError`] if a shard is damaged.
+    pub fn finest_geometry<E: From<FormatError>>(
         &self,
-        level: u32,
         mut fetch: impl FnMut(Range<u64>) -> Result<Vec<u8>, E>,
     ) -> Result<Geometry, E> {
-        if level == self.table.levels() - 1 {
-            return Ok(self.root.header.geometry.clone());
-        }
-        let missing = || {
-            let reason = format!("there is no level {level}");
-            FormatError::Source(io::Error::new(ErrorKind::NotFound, reason))
-        };
-        if level >= self.table.levels() {
-            return Err(missing().into());
-        }
-        let (camera, light) = (self.table.camera(level), self.table.light(level));
+        let (camera, light) = (self.table.camera(0), self.table.light(0));
         let whole = TileRect {
             x: 0,
             y: 0,
             extent: camera,
         };
-        let shards = self.shards_in(level, whole);
+        let shards = self.shards_in(0, whole);
         let shards = shards.map(|id| Ok(self.index(id, &mut fetch)?.header.geometry));
         let shards = shards.collect::<Result<Vec<_>, E>>()?;
-        Ok(geometry::whole(camera, light, &shards).ok_or_else(missing)?)
+        let whole = geometry::whole(camera, light, &shards);
+        Ok(whole.map_err(FormatError::InvalidGeometry)?)
     }
 
     /// Reads the tiles of a shard that have pixels of `rect`, in its level. `fetch` gives bytes of the file.

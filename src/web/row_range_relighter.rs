@@ -66,9 +66,9 @@ impl RowRangeRelighter {
         Ok(())
     }
 
-    /// Writes the row range under a light into `out`: RGBA, row by row. Rows out of view are not written. `light` has linear RGB of the
-    /// [`lightRows`](Self::light_rows); without it, the last light stays. `quality` is the share of the components in use,
-    /// 0 to 1. Both arrays are copied in strips: the module's memory never shrinks.
+    /// Writes the row range under a light into `out`: RGBA, row by row. Rows out of view are not written. `light` has linear RGB
+    /// of the [`lightRows`](Self::light_rows); without it, the last light stays. `quality` is the share of the components in
+    /// use, 0 to 1. Both arrays are copied in strips: the module's memory never shrinks.
     ///
     /// # Errors
     /// Code `internal` if an array has another length.

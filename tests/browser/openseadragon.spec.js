@@ -112,10 +112,34 @@ test.describe('OpenSeadragon', () => {
     expect(fetched()).toBeGreaterThan(before);
   });
 
+  test('reports tiles that cannot be drawn again, and draws them once they can', async ({
+    openPage,
+  }) => {
+    const page = await openPage('/viewer');
+    await openViewer(page, { maxBytes: 1 }, 'webgl');
+    await waitUntil(page, LOADED);
+    const setLight = (/** @type {string} */ light) =>
+      page.evaluate(`tiles.setLight('${light}').then(() => '', (error) => error.code)`);
+    await page.route('**/photos/levels.ltm', (route) => route.abort());
+    expect(await setLight('stripes')).toBe('http-network');
+    await page.unroute('**/photos/levels.ltm');
+    expect(await setLight('spectrum')).toBe('');
+    const native = nativePicture('spectrum', { photo: LEVELS_FILE });
+    await expect(async () => {
+      expect(await screenPicture(page, '#viewer')).toMatchPicture(native, 2);
+    }).toPass();
+  });
+
   test('shows a photograph of one level', async ({ openPage }) => {
     const page = await openPage('/viewer');
-    await openViewer(page, { light: 'torch' }, 'canvas', '/photos/glass.ltm');
+    await page.evaluate(
+      "Object.assign(document.querySelector('#viewer').style, { width: '64px', height: '64px' })",
+    );
+    await openViewer(page, { light: 'torch' }, 'webgl', '/photos/glass.ltm');
     await waitUntil(page, LOADED);
+    await expect(async () => {
+      expect(await screenPicture(page, '#viewer')).toMatchPicture(nativePicture('torch'), 2);
+    }).toPass();
     expect(await page.evaluate('[tiles.info.width, viewer.world.getItemCount()]')).toEqual([64, 1]);
     await page.evaluate('viewer.destroy(); tiles.setLight("flood").then(() => tiles.free())');
   });

@@ -297,7 +297,8 @@ impl RecoverJob<'_> {
             FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
             FormatError::TooLarge { limit, smallest } => {
                 // A file of several levels has a smaller limit for the finest one.
-                let smallest = (smallest as f64 * max_bytes as f64 / limit as f64).ceil() as u64;
+                let smallest =
+                    (smallest as f64 * max_bytes as f64 / limit.max(1) as f64).ceil() as u64;
                 let limit = max_bytes;
                 Error::new(FormatError::TooLarge { limit, smallest }).context(format!(
                     "{output}: cannot be written; the recovered tiles are kept: give the same command \

@@ -294,7 +294,7 @@ impl CpuRelighter {
         picture
     }
 
-    /// Writes rows of the picture after an output transform. Pixels out of view are black.
+    /// Writes rows of the picture after an output transform. Pixels out of view may be black.
     ///
     /// # Panics
     /// If `out` is not as large as the rows.

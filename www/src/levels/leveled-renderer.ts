@@ -44,9 +44,9 @@ interface Frame {
   readonly light: LightSetting;
   readonly output: OutputSettings;
   /** Share of the components. */
-  readonly quality: number;
-  /** The pixels that are drawn. */
-  readonly view: PixelRect;
+  readonly share: number;
+  /** The pixels of the shard that are drawn. */
+  readonly pixels: PixelRect;
 }
 
 const cache = new ShardCache();
@@ -62,8 +62,8 @@ export class LeveledRenderer implements Renderer {
   readonly #loader: ShardLoader;
   readonly #shards = new Map<string, Shard>();
   #shown = new Set<Shard>();
-  /** Those in memory that the view needs; others may be freed. */
-  #kept: ReadonlySet<Shard> = new Set();
+  /** Those in memory that the view needs; others may be freed. The cache has the same object. */
+  #kept = new Set<Shard>();
   /** The codes of errors of loads that were reported. */
   readonly #reported = new Set<string>();
   /** Replaced by finer ones, and on the screen until these are drawn. */
@@ -95,17 +95,17 @@ export class LeveledRenderer implements Renderer {
   }
 
   /** With less quality it draws a coarser level. Shards often have so few components that fewer of them save little. */
-  render(light: LightSetting, output: OutputSettings, ownQuality: number, part: FramePart = {}) {
+  render(light: LightSetting, output: OutputSettings, quality: number, part: FramePart = {}) {
     const view = this.#layer.view();
-    const shown = this.#update(view, ownQuality < 1);
-    const quality = Math.min(1, PIXEL_FACTOR * ownQuality);
+    const shown = this.#update(view, quality < 1);
+    const share = Math.min(1, PIXEL_FACTOR * quality);
     const drawn = part.onlyInView && view ? view.box : this.#table.picture;
     const barrier = new FrameBarrier(shown.size + 1);
     const drawings: Promise<unknown>[] = [];
     for (const shard of shown) {
       try {
-        const view = this.#table.pixelsIn(drawn, shard.id, shard.size);
-        const frame = { light, output, quality, view };
+        const pixels = this.#table.pixelsIn(drawn, shard.id, shard.size);
+        const frame = { light, output, share, pixels };
         const drawing = barrier.pass((ready) => shard.draw(frame, ready));
         if (drawing) drawings.push(drawing.catch(() => this.#lose(shard)));
       } catch {
@@ -114,8 +114,8 @@ export class LeveledRenderer implements Renderer {
     }
     const status = barrier.pass((ready) => {
       const id = { level: this.#table.levels - 1, x: 0, y: 0 };
-      const view = this.#table.pixelsIn(drawn, id, this.canvas);
-      return this.root.render(light, output, quality, { view, ready });
+      const pixels = this.#table.pixelsIn(drawn, id, this.canvas);
+      return this.root.render(light, output, share, { view: pixels, ready });
     });
     // Not before they are drawn.
     const show = () => {
@@ -166,7 +166,8 @@ export class LeveledRenderer implements Renderer {
   /** Nobody sees the picture: its shards may be freed. */
   #hide(): void {
     this.#loader.request([]);
-    cache.show(this, [], new Set());
+    this.#kept = new Set();
+    cache.show(this, [], this.#kept);
   }
 
   /** Gives the shards of the view that are in memory, and loads the others. */
@@ -181,7 +182,6 @@ export class LeveledRenderer implements Renderer {
     const limit = Math.max(maxShards, MIN_SHARDS);
     const selection = selectShards(this.#table, view, isLoaded, limit, isCoarse);
     const { needed } = selection;
-    if (selection.isPending) this.qualityController.discardFrames();
     const bytes = cache.maxBytes / Math.max(needed.length, MIN_SHARDS);
     const quads = Math.max(1, (bytes / pixels - BYTES_PER_PIXEL) / QUAD_BYTES);
     // Of few sizes, so that a shard takes the place of another in memory that never shrinks.
@@ -194,6 +194,8 @@ export class LeveledRenderer implements Renderer {
     // Those on the screen stay until the others are drawn, if there is room.
     cache.show(this, [...this.#shown, ...shown], this.#kept);
     this.#loader.request(needed.filter((id) => !isLoaded(id) || this.#mayBeFiner(id)));
+    const isComing = (id: ShardId) => id.level > selection.level && this.#loader.isLoading(id);
+    if (selection.isPending && needed.some(isComing)) this.qualityController.discardFrames();
     return shown;
   }
 
@@ -219,6 +221,8 @@ export class LeveledRenderer implements Renderer {
       const coarser = this.#shards.get(keyOf(id));
       if (coarser) this.#outgoing.add(coarser);
       this.#shards.set(keyOf(id), shard);
+      // Before the end of a frame that does not know it.
+      this.#kept.add(shard);
       cache.add(shard);
       this.#layer.requestFrame();
     } catch (thrown) {
@@ -297,9 +301,9 @@ class Shard implements CachedShard {
   draw(frame: Frame, ready: () => Promise<void>): Promise<unknown> | null {
     const last = this.#last;
     const isSame =
-      last?.light === frame.light && last.output === frame.output && last.quality === frame.quality;
+      last?.light === frame.light && last.output === frame.output && last.share === frame.share;
     // The content of an image may have changed.
-    if (isSame && frame.light.image === null && contains(last.view, frame.view)) return null;
+    if (isSame && frame.light.image === null && contains(last.pixels, frame.pixels)) return null;
     this.#last = frame;
     return this.#render(frame, ready);
   }
@@ -324,8 +328,8 @@ class Shard implements CachedShard {
 
   #render(frame: Frame, ready?: () => Promise<void>): Promise<unknown> | null {
     if (this.isFreed) return null;
-    const { light, output, quality, view } = frame;
-    const drawn = this.renderer?.render(light, output, quality, { view, ready });
+    const { light, output, share, pixels } = frame;
+    const drawn = this.renderer?.render(light, output, share, { view: pixels, ready });
     this.#isInWorkers = drawn instanceof Promise;
     return drawn instanceof Promise ? drawn : null;
   }

@@ -30,6 +30,10 @@ export class ShardLoader {
     this.#startNext();
   }
 
+  isLoading(shard: ShardId): boolean {
+    return this.#loads.has(keyOf(shard));
+  }
+
   #startNext(): void {
     for (const shard of this.#needed) {
       if (this.#loads.size >= this.maxLoads) return;

@@ -23,6 +23,9 @@ export interface ShardSelection {
   readonly isPending: boolean;
 }
 
+/** Coarser by this many levels comes first where the next coarser level does not fit: a sixteenth of the bytes. */
+const OVERVIEW_STEPS = 2;
+
 /**
  * A view that needs more than `maxShards` gets a coarser level. The level after it comes first, as it has a quarter of the
  * bytes, and stays if there is room: with `isCoarse` a frame has that, for which others make room.
@@ -45,7 +48,8 @@ export function selectShards(
   const isComplete = shards.every(isLoaded);
   const coarse = table.shardsIn(level + 1, rect);
   const hasRoom = shards.length + coarse.length <= maxShards;
-  const first = hasRoom || isCoarse || !isComplete ? coarse : [];
+  const overview = isComplete ? [] : table.shardsIn(level + OVERVIEW_STEPS, rect);
+  const first = hasRoom || isCoarse ? coarse : overview;
   const fine = nearestFirst(table, shards, rect);
   const needed = [...first, ...fine.slice(0, isCoarse ? maxShards - coarse.length : undefined)];
   if (!isCoarse || level === root) return { level, needed, isComplete, isPending: false };

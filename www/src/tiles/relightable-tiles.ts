@@ -7,7 +7,12 @@ import { messageOf } from '../shared/errors.js';
 import type { LightName, ToneCurve } from '../shared/keywords.js';
 import { parseExposure, parseTone, parseWhiteBalance } from '../shared/setting-parsers.js';
 import type { PhotoInfo, RgbGains } from '../shared/value-types.js';
-import { type LightOptions, NO_OVERRIDES, parsePageLight } from '../state/page-light.js';
+import {
+  checkFields,
+  type LightOptions,
+  NO_OVERRIDES,
+  parsePageLight,
+} from '../state/page-light.js';
 import type { TileFrame, TileRenderer } from './tile-renderer.js';
 
 /** The name of a built-in light, its options, or an image. The time of a fire is in seconds since it was lit. */
@@ -42,8 +47,11 @@ export interface ViewerImage {
 
 /** An `OpenSeadragon.Viewer`. */
 export interface Viewer {
-  readonly world: { requestInvalidate?(restoreTiles: boolean): PromiseLike<unknown> };
+  readonly world: {
+    requestInvalidate?(restoreTiles: boolean, tStamp: number): PromiseLike<unknown>;
+  };
   addHandler(name: string, handler: (event: never) => unknown): unknown;
+  removeHandler(name: string, handler: (event: never) => unknown): unknown;
 }
 
 /** An `OpenSeadragon.ImageJob`. */
@@ -81,11 +89,15 @@ export class RelightableTiles {
   #light: TileLight;
   #output: TileOutput;
   #frame: TileFrame;
-  /** The frame that a tile shows. */
+  /** The frame of a tile's own data, until its first event. */
   readonly #drawn = new WeakMap<ViewerTile, TileFrame>();
   readonly #aborted = new WeakSet<TileJob>();
-  readonly #viewers = new Set<Viewer>();
+  /** The viewers that show it, and what stops following each. */
+  readonly #viewers = new Map<Viewer, () => void>();
   #redrawing: Promise<void> | null = null;
+  /** Why a tile could not be redrawn. */
+  #failure: unknown = null;
+  #lastStamp = 0;
 
   /** Takes the renderer over. `src` is the address of the photograph. Throws for an invalid light or output. */
   constructor(
@@ -115,14 +127,17 @@ export class RelightableTiles {
     };
   }
 
-  /** Shows the photograph under another light; an image is read again. Settles when the visible tiles are drawn. */
+  /**
+   * Shows the photograph under another light; an image is read again. Settles when the visible tiles are drawn; rejects if
+   * one cannot be, which keeps its last light.
+   */
   setLight(light: TileLight): Promise<void> {
     this.#frame = frameOf(light, this.#output);
     this.#light = light;
     return this.#redraw();
   }
 
-  /** Shows the picture in another way. Settles when the visible tiles are drawn. */
+  /** Shows the picture in another way. Settles as `setLight` does. */
   setOutput(output: TileOutput): Promise<void> {
     this.#frame = frameOf(this.#light, output);
     this.#output = output;
@@ -131,15 +146,17 @@ export class RelightableTiles {
 
   /** Frees its memory. Close its viewers, or remove it from them, before. */
   free(): void {
-    this.#viewers.clear();
+    for (const stop of [...this.#viewers.values()]) stop();
     this.renderer.free();
   }
 
   async #load(job: TileJob): Promise<void> {
     const { tile } = job;
     try {
-      const context = await this.#draw(tile);
+      const frame = this.#frame;
+      const context = await this.#draw(tile, frame);
       if (this.#aborted.has(job)) return;
+      this.#drawn.set(tile, frame);
       if (tile.tiledImage) this.#follow(tile.tiledImage.viewer);
       job.finish(context, null, 'context2d');
     } catch (thrown) {
@@ -147,13 +164,8 @@ export class RelightableTiles {
     }
   }
 
-  async #draw(tile: ViewerTile): Promise<CanvasRenderingContext2D> {
-    const frame = this.#frame;
-    const { level, x, y } = tile;
-    const id = { level: this.renderer.levels - 1 - level, x, y };
-    const context = await this.renderer.draw(id, frame);
-    this.#drawn.set(tile, frame);
-    return context;
+  #draw({ level, x, y }: ViewerTile, frame: TileFrame): Promise<CanvasRenderingContext2D> {
+    return this.renderer.draw({ level: this.renderer.levels - 1 - level, x, y }, frame);
   }
 
   #follow(viewer: Viewer): void {
@@ -161,16 +173,31 @@ export class RelightableTiles {
     if (!viewer.world.requestInvalidate) {
       throw new Error('relightable tiles need OpenSeadragon 6 or later');
     }
-    this.#viewers.add(viewer);
-    viewer.addHandler('destroy', () => this.#viewers.delete(viewer));
-    viewer.addHandler('tile-invalidated', async (event: TileInvalidatedEvent) => {
-      const { tile, tiledImage } = event;
-      const { downloadTileStart } = tiledImage.source as Partial<RelightableTileSource>;
-      if (downloadTileStart !== this.tileSource.downloadTileStart) return;
-      if (!this.#viewers.has(viewer) || this.#drawn.get(tile) === this.#frame) return;
-      const context = await this.#draw(tile);
+    const redraw = (event: TileInvalidatedEvent) => this.#redrawTile(event);
+    const stop = () => {
+      this.#viewers.delete(viewer);
+      viewer.removeHandler('tile-invalidated', redraw);
+      viewer.removeHandler('destroy', stop);
+    };
+    this.#viewers.set(viewer, stop);
+    viewer.addHandler('tile-invalidated', redraw);
+    viewer.addHandler('destroy', stop);
+  }
+
+  /** OpenSeadragon would only log an error, and keep the tile as it is. */
+  async #redrawTile(event: TileInvalidatedEvent): Promise<void> {
+    const { tile, tiledImage } = event;
+    const { downloadTileStart } = tiledImage.source as Partial<RelightableTileSource>;
+    if (downloadTileStart !== this.tileSource.downloadTileStart) return;
+    const loaded = this.#drawn.get(tile);
+    this.#drawn.delete(tile);
+    if (loaded === this.#frame) return;
+    try {
+      const context = await this.#draw(tile, this.#frame);
       if (!event.outdated()) await event.setData(context, 'context2d');
-    });
+    } catch (thrown) {
+      this.#failure = thrown;
+    }
   }
 
   /** A change during a frame is drawn by the next one. */
@@ -184,17 +211,24 @@ export class RelightableTiles {
   async #redrawAll(): Promise<void> {
     for (let frame: TileFrame | null = null; frame !== this.#frame; ) {
       frame = this.#frame;
-      await Promise.all([...this.#viewers].map(({ world }) => world.requestInvalidate?.(false)));
+      this.#failure = null;
+      // Two of the same time would be one.
+      this.#lastStamp = Math.max(Date.now(), this.#lastStamp + 1);
+      const viewers = [...this.#viewers.keys()];
+      await Promise.all(
+        viewers.map(({ world }) => world.requestInvalidate?.(false, this.#lastStamp)),
+      );
     }
+    if (this.#failure) throw this.#failure;
   }
 }
 
 /** Throws a `TypeError` or a `PhotoError` for an invalid value. */
 function frameOf(light: TileLight, output: TileOutput): TileFrame {
   const { exposure = 1, whiteBalance = [1, 1, 1], tone = null } = output;
-  const { seconds, ...value } = isOptions(light) ? light : { seconds: undefined };
-  const options = isOptions(light) ? value : light;
-  const parsed = parsePageLight(options, DEFAULTS);
+  const { seconds, ...fields } = isOptions(light) ? light : {};
+  checkFields({ seconds }, 'light', ['seconds']);
+  const parsed = parsePageLight(isOptions(light) ? fields : light, DEFAULTS);
   const { name, torch, size, color, source } = parsed;
   const gains = parseWhiteBalance(whiteBalance.join(' '));
   return {
@@ -218,6 +252,7 @@ const DEFAULTS = { ...NO_OVERRIDES, name: 'flood', src: null, crossOrigin: null 
 function isOptions(light: TileLight): light is LightOptions & { readonly seconds?: number } {
   return (
     typeof light === 'object' &&
+    light !== null &&
     Object.getPrototypeOf(light) === Object.prototype &&
     !isLinearLight(light)
   );

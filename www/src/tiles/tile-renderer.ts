@@ -11,8 +11,10 @@ import { memoryLimit } from '../shared/memory-limit.js';
 
 const MAX_BYTES = 512 * 2 ** 20;
 const MAX_BYTES_PER_GIB = 64 * 2 ** 20;
-/** Tiles of a screen, and some around them. */
-const TILES_AT_ONCE = 16;
+/** Tiles of a screen, and some around them, should fit in memory. */
+const TILES_OF_SCREEN = 16;
+/** Tiles that are opened or drawn at a time. */
+const MAX_DRAWINGS = 4;
 /** Memory for a pixel beside its tiles: the canvas, its copy in a worker, and the picture in linear light. */
 const BYTES_PER_PIXEL = 20;
 
@@ -32,6 +34,10 @@ export class TileRenderer {
   readonly table: LevelTable | null;
   readonly #cache: ShardCache;
   readonly #tiles = new Map<string, CachedTile>();
+  /** Those that are opened or drawn, which stay in memory; the cache has the same object. */
+  readonly #busy = new Set<CachedTile>();
+  readonly #waiting: (() => void)[] = [];
+  #drawings = 0;
   readonly #end = new AbortController();
 
   /** Takes the photograph over. It is the last level, if there are several. */
@@ -52,21 +58,16 @@ export class TileRenderer {
 
   /** Draws a tile on a new canvas. Rejects with a `PhotoError`. A tile whose worker is gone is loaded again. */
   async draw(id: ShardId, frame: TileFrame): Promise<CanvasRenderingContext2D> {
-    this.#end.signal.throwIfAborted();
-    const key = keyOf(id);
-    let tile = this.#tiles.get(key);
-    if (!tile) {
-      tile = new CachedTile(this.#open(id), () => this.#tiles.delete(key));
-      this.#tiles.set(key, tile);
-      this.#cache.add(tile);
+    if (this.#drawings >= MAX_DRAWINGS) {
+      await new Promise<void>((resolve) => this.#waiting.push(resolve));
     }
-    this.#cache.show(this, [tile], new Set([tile]));
+    this.#drawings += 1;
     try {
-      return await tile.draw(frame);
-    } catch (thrown) {
-      this.#cache.delete(tile);
-      tile.evict();
-      throw thrown;
+      this.#end.signal.throwIfAborted();
+      return await this.#drawNow(this.#tileOf(id), frame);
+    } finally {
+      this.#drawings -= 1;
+      this.#waiting.shift()?.();
     }
   }
 
@@ -76,6 +77,40 @@ export class TileRenderer {
     this.photograph.free();
   }
 
+  #tileOf(id: ShardId): CachedTile {
+    const key = keyOf(id);
+    const known = this.#tiles.get(key);
+    if (known) return known;
+    const tile: CachedTile = new CachedTile(this.#open(id), this.#maxTileBytes, () => {
+      if (this.#tiles.get(key) === tile) this.#tiles.delete(key);
+    });
+    this.#tiles.set(key, tile);
+    this.#cache.add(tile);
+    return tile;
+  }
+
+  async #drawNow(tile: CachedTile, frame: TileFrame): Promise<CanvasRenderingContext2D> {
+    this.#busy.add(tile);
+    this.#cache.show(this, [tile], this.#busy);
+    try {
+      return await tile.draw(frame);
+    } catch (thrown) {
+      this.#cache.delete(tile);
+      tile.evict();
+      throw thrown;
+    } finally {
+      this.#busy.delete(tile);
+      // Its bytes are known now.
+      this.#cache.show(this, [], this.#busy);
+    }
+  }
+
+  /** Memory for the coefficients of a tile. */
+  get #maxTileBytes(): number {
+    const pixels = (this.table?.shardSide ?? 0) ** 2;
+    return Math.max(0, this.#cache.maxBytes / TILES_OF_SCREEN - BYTES_PER_PIXEL * pixels);
+  }
+
   async #open(id: ShardId): Promise<OpenTile> {
     const { photograph, table } = this;
     const { signal } = this.#end;
@@ -83,9 +118,7 @@ export class TileRenderer {
     if (!table || id.level === root) {
       return { renderer: await this.createRenderer(photograph, signal), photograph: null };
     }
-    const maxTileBytes =
-      this.#cache.maxBytes / TILES_AT_ONCE - BYTES_PER_PIXEL * table.shardSide ** 2;
-    const request = { bytes: table.bytesOf(id), maxTileBytes: Math.max(0, maxTileBytes) };
+    const request = { bytes: table.bytesOf(id), maxTileBytes: this.#maxTileBytes };
     const shard = await photograph.openShard?.(request, signal);
     if (!shard) throw photoReleased();
     try {
@@ -106,18 +139,18 @@ interface OpenTile {
 }
 
 class CachedTile implements CachedShard {
-  /** Known once it is open. */
-  bytes = 0;
   /** Frames are drawn one after the other. */
   #last: Promise<unknown>;
+  #isEvicted = false;
 
+  /** `bytes` is an estimate until it is open. */
   constructor(
     private readonly tile: Promise<OpenTile>,
+    public bytes: number,
     private readonly forget: () => void,
   ) {
     this.#last = tile.then(({ photograph }) => {
-      if (!photograph) return;
-      const { width, height, decodedBytes } = photograph.info;
+      const { width = 0, height = 0, decodedBytes = 0 } = photograph?.info ?? {};
       this.bytes = decodedBytes + BYTES_PER_PIXEL * width * height;
     });
     this.#last.catch(() => {});
@@ -127,23 +160,25 @@ class CachedTile implements CachedShard {
     const drawing = this.#last.then(async () => {
       const { renderer } = await this.tile;
       const { lightError } = await renderer.render(light, output, 1);
-      if (lightError) throw lightError;
-      return copyOf(renderer.canvas);
+      return { context: copyOf(renderer.canvas), lightError };
     });
     this.#last = drawing.catch(() => {});
-    return await drawing;
+    const { context, lightError } = await drawing;
+    if (lightError) throw lightError;
+    return context;
   }
 
   evict(): void {
+    if (this.#isEvicted) return;
+    this.#isEvicted = true;
     this.forget();
     // The frame that is being drawn ends first.
-    void this.#last
-      .finally(async () => {
-        const { renderer, photograph } = await this.tile;
-        renderer.free();
-        photograph?.free();
-      })
-      .catch(() => {});
+    const free = async () => {
+      const { renderer, photograph } = await this.tile;
+      renderer.free();
+      photograph?.free();
+    };
+    void this.#last.then(free, free).catch(() => {});
   }
 }
 
