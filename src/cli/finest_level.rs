@@ -20,6 +20,9 @@ use crate::transport::{
     Transport,
 };
 
+/// Gets rows of a picture, and their pixels.
+type TakeRows<'a> = dyn FnMut(Range<u32>, &[[f32; CHANNELS]]) -> Result<()> + 'a;
+
 /// The finest level of a file.
 pub struct FinestLevel {
     pub geometry: Geometry,
@@ -177,11 +180,7 @@ impl ShardFile {
         shard.with_context(|| format!("{}: {id}", self.path.display()))
     }
 
-    fn relight(
-        &mut self,
-        light: &Light,
-        take: &mut dyn FnMut(Range<u32>, &[[f32; CHANNELS]]) -> Result<()>,
-    ) -> Result<()> {
+    fn relight(&mut self, light: &Light, take: &mut TakeRows<'_>) -> Result<()> {
         let (camera, side) = (
             self.reader.table().camera(0),
             self.reader.table().shard_side(),
