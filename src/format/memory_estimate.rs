@@ -16,7 +16,7 @@ use crate::transport::{CHANNELS, TexelCodes, Tile};
 const STATE_BYTES: u64 = 32;
 const TILE_STATE_BYTES: u64 = 256;
 
-/// What is read of a file at a time.
+/// How much of a file is read at a time.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Part {
     WholeFile,

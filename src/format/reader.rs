@@ -57,7 +57,7 @@ pub struct LtmReader {
     received_index_bytes: u64,
     /// Bytes that the coefficients may take.
     max_tile_bytes: Option<u64>,
-    /// What it has to have memory for.
+    /// How much of the file the limits must cover.
     part: Part,
 }
 

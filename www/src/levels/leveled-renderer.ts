@@ -16,13 +16,12 @@ import { allSettledOrThrow } from '../shared/promises.js';
 import type { PixelRect } from '../shared/value-types.js';
 import { FrameBarrier } from './frame-barrier.js';
 import { keyOf, LevelTable, type ShardId } from './level-table.js';
+import { BYTES_PER_PIXEL, drawnBytes, openShard } from './open-shard.js';
 import { type CachedShard, ShardCache } from './shard-cache.js';
 import { ShardLayer } from './shard-layer.js';
 import { ShardLoader } from './shard-loader.js';
 import { contains, overlap, type PictureView, selectShards } from './shard-selection.js';
 
-/** Memory for a pixel beside its tiles: the canvas, its copy in a worker, and the picture in linear light. */
-const BYTES_PER_PIXEL = 20;
 /** Memory for four more components of a pixel. */
 const QUAD_BYTES = 24;
 /** A view of fewer shards leaves room for others, among them those that are being loaded. */
@@ -204,13 +203,10 @@ export class LeveledRenderer implements Renderer {
     try {
       const quads = this.#quads;
       const maxTileBytes = quads * QUAD_BYTES * this.pixels;
-      const bytes = this.#table.bytesOf(id);
-      const loaded = await photograph.openShard?.({ bytes, maxTileBytes }, signal);
+      const loaded = await openShard(photograph, this.#table, id, maxTileBytes, signal);
       if (!loaded) return;
-      loaded.root = { photograph, scale: 2 ** (this.#table.levels - 1 - id.level) };
       const shard = new Shard(id, this.#table.rectOf(id), loaded, quads, () => this.#free(shard));
       try {
-        this.#table.checkPlace(id, loaded.descriptor);
         shard.renderer = await this.createShardRenderer(loaded, () => this.#lose(shard), signal);
         signal.throwIfAborted();
         if (shard.isFreed) throw new PhotoError('backend-lost', 'Its device was lost at once.');
@@ -293,8 +289,7 @@ class Shard implements CachedShard {
   }
 
   get bytes(): number {
-    const { width, height, decodedBytes } = this.photograph.info;
-    return decodedBytes + BYTES_PER_PIXEL * width * height;
+    return drawnBytes(this.photograph.info);
   }
 
   /** Draws a frame, unless it has drawn the same. */

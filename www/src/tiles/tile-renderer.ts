@@ -2,6 +2,7 @@
 
 import type { OutputSettings } from '../engine/output-settings.js';
 import { keyOf, LevelTable, type ShardId } from '../levels/level-table.js';
+import { BYTES_PER_PIXEL, drawnBytes, openShard } from '../levels/open-shard.js';
 import { type CachedShard, ShardCache } from '../levels/shard-cache.js';
 import type { LightSetting } from '../lights/light-setting.js';
 import type { LoadedPhotograph } from '../photo/photograph.js';
@@ -15,8 +16,6 @@ const MAX_BYTES_PER_GIB = 64 * 2 ** 20;
 const TILES_OF_SCREEN = 16;
 /** Tiles that are opened or drawn at a time. */
 const MAX_DRAWINGS = 4;
-/** Memory for a pixel beside its tiles: the canvas, its copy in a worker, and the picture in linear light. */
-const BYTES_PER_PIXEL = 20;
 
 /** What a tile shows. */
 export interface TileFrame {
@@ -114,16 +113,12 @@ export class TileRenderer {
   async #open(id: ShardId): Promise<OpenTile> {
     const { photograph, table } = this;
     const { signal } = this.#end;
-    const root = this.levels - 1;
-    if (!table || id.level === root) {
+    if (!table || id.level === table.levels - 1) {
       return { renderer: await this.createRenderer(photograph, signal), photograph: null };
     }
-    const request = { bytes: table.bytesOf(id), maxTileBytes: this.#maxTileBytes };
-    const shard = await photograph.openShard?.(request, signal);
+    const shard = await openShard(photograph, table, id, this.#maxTileBytes, signal);
     if (!shard) throw photoReleased();
     try {
-      table.checkPlace(id, shard.descriptor);
-      shard.root = { photograph, scale: 2 ** (root - id.level) };
       return { renderer: await this.createRenderer(shard, signal), photograph: shard };
     } catch (thrown) {
       shard.free();
@@ -150,8 +145,7 @@ class CachedTile implements CachedShard {
     private readonly forget: () => void,
   ) {
     this.#last = tile.then(({ photograph }) => {
-      const { width = 0, height = 0, decodedBytes = 0 } = photograph?.info ?? {};
-      this.bytes = decodedBytes + BYTES_PER_PIXEL * width * height;
+      this.bytes = photograph ? drawnBytes(photograph.info) : 0;
     });
     this.#last.catch(() => {});
   }
