@@ -24,7 +24,7 @@ use relightable_photo::format::{
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::pyramid::PyramidReader;
 use relightable_photo::relight::BuiltinLight;
-use relightable_photo::relight::cpu::CpuRelighter;
+use relightable_photo::relight::cpu::LinearRelighter;
 use relightable_photo::transport::{CHANNELS, Extent, Geometry, TileRect};
 
 use figures::Figures;
@@ -124,7 +124,7 @@ impl Levels {
             let fetch = |range| Ok::<_, FormatError>(read_range(&self.file, range));
             let shard = self.reader.shard(id, whole, fetch).unwrap();
             let light = light.render(shard.transport.geometry.light_region());
-            let mut relighter = CpuRelighter::new(Arc::new(shard.transport));
+            let mut relighter = LinearRelighter::new(Arc::new(shard.transport));
             relighter.relight(&light, &SequentialExecutor);
             for (pixel, value) in shard.rect.pixels().zip(&relighter.linear().pixels) {
                 picture[camera.index(pixel)] = [0, 1, 2].map(|c| f64::from(value[c]));

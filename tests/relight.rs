@@ -9,7 +9,7 @@ use common::relit::{self, TileContents};
 use common::{bent, tiled};
 use proptest::prelude::*;
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::relight::cpu::CpuRelighter;
+use relightable_photo::relight::cpu::{EncodedRelighter, LinearRelighter};
 use relightable_photo::relight::{BuiltinLight, Light, OutputTransform, TorchSpot, reference};
 use relightable_photo::transport::{
     CameraPixel, Extent, Geometry, LightPosition, LightRegion, MAX_WINDOW, Tile, TileRect,
@@ -103,7 +103,7 @@ proptest! {
         let contents = [TileContents::Direct, TileContents::Factored, TileContents::Mixed][seed as usize % 3];
         let transport = Arc::new(relit::asymmetric_transport(geometry.clone(), contents, seed));
         // One relighter for all lights: the last light must leave nothing behind.
-        let mut relighter = CpuRelighter::new(transport.clone());
+        let mut relighter = LinearRelighter::new(transport.clone());
         for (name, light) in relit::lights(geometry.light) {
             relighter.relight(&light, &SequentialExecutor);
             let output = relit::output_transforms(exposure)[seed as usize / 3 % 4];
@@ -124,7 +124,7 @@ fn windows_off_the_light_plane_are_dark() {
             TileContents::Mixed,
             1,
         ));
-        let mut relighter = CpuRelighter::new(transport);
+        let mut relighter = LinearRelighter::new(transport);
         for (name, light) in relit::lights(geometry.light) {
             relighter.relight(&light, &SequentialExecutor);
             let picture = relighter.picture(&OutputTransform::srgb(1.0), &SequentialExecutor);
@@ -150,7 +150,7 @@ fn a_moving_light_leaves_nothing_behind() {
         TileContents::Mixed,
         3,
     ));
-    let mut moved = CpuRelighter::new(transport.clone());
+    let mut moved = LinearRelighter::new(transport.clone());
     for step in 0..6 {
         let centre = LightPosition {
             u: 20.0 * f64::from(step),
@@ -167,7 +167,7 @@ fn a_moving_light_leaves_nothing_behind() {
         }
         let light = Light::from_linear_rgb(geometry.light, &elements).unwrap();
         moved.relight(&light, &SequentialExecutor);
-        let mut fresh = CpuRelighter::new(transport.clone());
+        let mut fresh = LinearRelighter::new(transport.clone());
         fresh.relight(&light, &SequentialExecutor);
         assert_eq!(moved.linear(), fresh.linear(), "step {step}");
     }
@@ -184,7 +184,7 @@ fn pixels_out_of_view_follow_once_they_are_in_view() {
         y,
         extent: Extent::new(width, height),
     };
-    let mut relighter = CpuRelighter::new(transport.clone());
+    let mut relighter = LinearRelighter::new(transport.clone());
     let output = OutputTransform::srgb(1.0);
     let views = [
         view(0, 0, 90, 70),
@@ -201,7 +201,7 @@ fn pixels_out_of_view_follow_once_they_are_in_view() {
         let (name, light) = &lights[i.min(views.len() - 2) % lights.len()];
         relighter.set_quality([1.0, 0.5][i % 2]);
         relighter.relight(light, &SequentialExecutor);
-        let mut fresh = CpuRelighter::new(transport.clone());
+        let mut fresh = LinearRelighter::new(transport.clone());
         fresh.set_quality([1.0, 0.5][i % 2]);
         fresh.relight(light, &SequentialExecutor);
         let (got, want) = (
@@ -237,9 +237,9 @@ proptest! {
                     *tile = Tile::dark(tile.rect());
                 }
             }
-            (CpuRelighter::new(Arc::new(part)), rows)
+            (LinearRelighter::new(Arc::new(part)), rows)
         });
-        let mut whole = CpuRelighter::new(Arc::new(transport));
+        let mut whole = LinearRelighter::new(Arc::new(transport));
         let output = relit::output_transforms(1.0)[seed as usize / 3 % 4];
         for (name, light) in relit::lights(geometry.light) {
             whole.relight(&light, &SequentialExecutor);
@@ -264,6 +264,32 @@ proptest! {
 }
 
 #[test]
+fn kept_codes_are_those_of_the_linear_picture() {
+    let affine = [[1.5, 0.02, 1.0], [0.0, 1.5, -2.0]];
+    let geometry = tiled([90, 70], [140, 110], 15, 32, affine);
+    let transport = relit::asymmetric_transport(geometry.clone(), TileContents::Mixed, 3);
+    let transport = Arc::new(transport);
+    let mut linear = LinearRelighter::new(transport.clone());
+    let mut encoded = EncodedRelighter::new(transport);
+    let outputs = relit::output_transforms(1.5);
+    for (i, (name, light)) in relit::lights(geometry.light).into_iter().enumerate() {
+        linear.relight(&light, &SequentialExecutor);
+        encoded.relight(&light, &SequentialExecutor);
+        // The light stays while the output transform changes, and once both stay.
+        for output in [outputs[i % 4], outputs[(i + 1) % 4], outputs[(i + 1) % 4]] {
+            encoded.set_output(&output);
+            encoded.update(&SequentialExecutor);
+            let want = linear.picture(&output, &SequentialExecutor).pixels;
+            let mut got = vec![[9; 4]; want.len()];
+            encoded.copy_rows(0..70, &mut got);
+            assert_eq!(got, want, "{name}");
+            encoded.copy_rows(33..40, &mut got[..7 * 90]);
+            assert_eq!(got[..7 * 90], want[33 * 90..40 * 90], "{name}");
+        }
+    }
+}
+
+#[test]
 fn lower_quality_is_the_first_components_and_can_be_undone() {
     let geometry = tiled(
         [70, 50],
@@ -277,7 +303,7 @@ fn lower_quality_is_the_first_components_and_can_be_undone() {
         TileContents::Mixed,
         5,
     ));
-    let mut relighter = CpuRelighter::new(transport.clone());
+    let mut relighter = LinearRelighter::new(transport.clone());
     for (name, light) in relit::lights(geometry.light) {
         relighter.set_quality(1.0);
         relighter.relight(&light, &SequentialExecutor);

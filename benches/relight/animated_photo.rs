@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use relightable_photo::job_executor::{Executor, SequentialExecutor};
-use relightable_photo::relight::cpu::CpuRelighter;
+use relightable_photo::relight::cpu::LinearRelighter;
 use relightable_photo::relight::{Light, OutputTransform, Rgba8Picture, TorchSpot};
 use relightable_photo::transport::{Extent, LightPosition, Tile, Transport};
 
@@ -71,7 +71,7 @@ impl FrameTime {
 
 /// A photograph under a sequence of lights.
 pub struct AnimatedPhoto {
-    pub relighter: CpuRelighter,
+    pub relighter: LinearRelighter,
     pub lights: Vec<Light>,
     /// Frames drawn since the light sequence began.
     frame: usize,
@@ -81,7 +81,7 @@ pub struct AnimatedPhoto {
 impl AnimatedPhoto {
     pub fn new(side: u32, rank: usize) -> Self {
         Self {
-            relighter: CpuRelighter::new(Arc::new(transport(side, rank))),
+            relighter: LinearRelighter::new(Arc::new(transport(side, rank))),
             lights: Vec::new(),
             frame: 0,
             picture: Rgba8Picture::filled(square(side), [0, 0, 0, 255]),

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use rayon::prelude::*;
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::relight::Light;
-use relightable_photo::relight::cpu::CpuRelighter;
+use relightable_photo::relight::cpu::LinearRelighter;
 use relightable_photo::transport::{CHANNELS, Transport};
 use serde_json::Value;
 use sprs::CsMatViewI;
@@ -151,7 +151,7 @@ fn planes(elements: impl Iterator<Item = [f32; 4]> + Clone) -> Planes {
     [0, 1, 2].map(|c| elements.clone().map(|element| element[c]).collect())
 }
 
-fn render_planes(relighter: &mut CpuRelighter, light: &Light) -> Planes {
+fn render_planes(relighter: &mut LinearRelighter, light: &Light) -> Planes {
     relighter.relight(light, &SequentialExecutor);
     planes(relighter.linear().pixels.iter().copied())
 }

@@ -14,7 +14,7 @@ use super::value_parsers::UsageError;
 use crate::format::{MetadataText, ShardId};
 use crate::pyramid::{PyramidReader, Shard};
 use crate::relight::Light;
-use crate::relight::cpu::CpuRelighter;
+use crate::relight::cpu::LinearRelighter;
 use crate::transport::{
     CHANNELS, Decibels, Extent, Geometry, SnrAccumulator, TileRect, TileTransportFunctions,
     Transport,
@@ -39,7 +39,7 @@ pub struct FinestLevel {
 }
 
 enum Source {
-    Whole(Box<CpuRelighter>),
+    Whole(Box<LinearRelighter>),
     Shards(Box<ShardFile>),
 }
 
@@ -102,7 +102,7 @@ impl FinestLevel {
             read_scans: progress.scans,
             scans: index.scans.len(),
             metadata: index.metadata,
-            source: Source::Whole(Box::new(CpuRelighter::new(Arc::new(transport)))),
+            source: Source::Whole(Box::new(LinearRelighter::new(Arc::new(transport)))),
         }
     }
 
@@ -192,7 +192,7 @@ impl ShardFile {
             for id in self.shards(rows.clone()) {
                 let Shard { rect, transport } = self.shard(id)?;
                 let light = light.part(transport.geometry.light_region());
-                let mut relighter = CpuRelighter::new(Arc::new(transport));
+                let mut relighter = LinearRelighter::new(Arc::new(transport));
                 relighter.relight(&light, &AllCoresExecutor);
                 let relit = linear_rgb(&relighter);
                 let columns = rect.x as usize..(rect.x + rect.extent.width) as usize;
@@ -208,7 +208,7 @@ impl ShardFile {
 }
 
 /// The relit picture; the relighter has a fourth number a pixel.
-fn linear_rgb(relighter: &CpuRelighter) -> Vec<[f32; CHANNELS]> {
+fn linear_rgb(relighter: &LinearRelighter) -> Vec<[f32; CHANNELS]> {
     let pixels = relighter.linear().pixels.into_iter();
     pixels
         .map(|[red, green, blue, _]| [red, green, blue])

@@ -12,7 +12,7 @@ use super::{CanvasRelighter, CodedError, Photo};
 use crate::job_executor::SequentialExecutor;
 use crate::relight::backend::{Backend, BackendError, FrameRequest};
 use crate::relight::canvas2d_context::{CanvasMemoryLocation, open_2d};
-use crate::relight::cpu::{self, CpuRelighter};
+use crate::relight::cpu::{self, EncodedRelighter};
 use crate::relight::{Gamut, Rgba8Picture};
 use crate::transport::{Extent, Transport};
 
@@ -33,7 +33,7 @@ extern "C" {
 /// Relights on the CPU and writes the pixels into a canvas.
 #[derive(Debug)]
 struct Canvas2dBackend {
-    relighter: CpuRelighter,
+    relighter: EncodedRelighter,
     picture: Rgba8Picture,
     context: CanvasRenderingContext2d,
     gamut: Gamut,
@@ -53,7 +53,7 @@ impl Canvas2dBackend {
         let space = gamut.color_space().into();
         Reflect::set(&settings, &"colorSpace".into(), &space).map_err(lost)?;
         Ok(Self {
-            relighter: CpuRelighter::new(transport),
+            relighter: EncodedRelighter::new(transport),
             picture: Rgba8Picture::filled(camera, [0, 0, 0, 255]),
             context,
             gamut,
@@ -91,14 +91,13 @@ impl Backend for Canvas2dBackend {
 
     fn render(&mut self, frame: &FrameRequest<'_>) -> Result<(), BackendError> {
         self.relighter.set_quality(frame.quality);
+        self.relighter.set_output(&frame.output);
         // This backend takes no light images, so frames have a light.
         if let Some(light) = frame.light {
             self.relighter.relight(light, &SequentialExecutor);
         }
         let rows = 0..self.picture.extent.height;
-        let pixels = &mut self.picture.pixels;
-        self.relighter
-            .encode_rows(&frame.output, rows, pixels, &SequentialExecutor);
+        self.relighter.copy_rows(rows, &mut self.picture.pixels);
         let bytes = Clamped(self.picture.pixels.as_flattened());
         let Extent { width, height } = self.picture.extent;
         let image =

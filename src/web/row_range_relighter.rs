@@ -7,13 +7,13 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{CodedError, Photo, WebOutputTransform};
 use crate::job_executor::SequentialExecutor;
-use crate::relight::cpu::{self, CpuRelighter, STRIP_ROWS};
+use crate::relight::cpu::{self, EncodedRelighter, STRIP_ROWS};
 use crate::transport::{CHANNELS, Extent, ShardOrigin, TileRect};
 
 /// Relights a row range of a photograph. Only its tiles are needed.
 #[wasm_bindgen]
 pub struct RowRangeRelighter {
-    relighter: CpuRelighter,
+    relighter: EncodedRelighter,
     rows: Range<u32>,
 }
 
@@ -30,7 +30,7 @@ impl RowRangeRelighter {
         let end =
             end.ok_or_else(|| CodedError::internal("the row range lies outside the picture"))?;
         Ok(Self {
-            relighter: CpuRelighter::new(photo.transport()),
+            relighter: EncodedRelighter::new(photo.transport()),
             rows: first..end,
         })
     }
@@ -105,6 +105,7 @@ impl RowRangeRelighter {
                 self.relighter.set_light_row(v, &row);
             }
         }
+        self.relighter.set_output(&output.0);
         self.relighter.update(&SequentialExecutor);
         // A view has a dozen shards, which are relit one after another.
         if self.relighter.transport().geometry.correspondence.origin != ShardOrigin::ZERO {
@@ -116,8 +117,7 @@ impl RowRangeRelighter {
         for first in rows.clone().step_by(STRIP_ROWS) {
             let rows = first..rows.end.min(first + STRIP_ROWS as u32);
             let pixels = &mut strip[..rows.len() * width as usize];
-            self.relighter
-                .encode_rows(&output.0, rows.clone(), pixels, &SequentialExecutor);
+            self.relighter.copy_rows(rows.clone(), pixels);
             let [start, end] =
                 [rows.start, rows.end].map(|row| 4 * (row - self.rows.start) * width);
             out.subarray(start, end).copy_from(pixels.as_flattened());

@@ -19,7 +19,7 @@ use super::process_resources::AllCoresExecutor;
 use super::value_parsers::{UsageError, parse_number};
 use crate::format::FileIndex;
 use crate::pyramid::PyramidReader;
-use crate::relight::cpu::CpuRelighter;
+use crate::relight::cpu::LinearRelighter;
 use crate::relight::{Light, OutputTransform, Rgba8Picture, TorchSpot, reference};
 use crate::transport::{ColorMatrix, Extent, LightRegion, TileRect, Transport, light_color_matrix};
 
@@ -239,7 +239,7 @@ impl RelightImplementation {
         let transform = &colors.transform;
         match self {
             Self::Cpu => {
-                let mut relighter = CpuRelighter::new(Arc::new(transport));
+                let mut relighter = LinearRelighter::new(Arc::new(transport));
                 relighter.relight(light, &AllCoresExecutor);
                 relighter.picture(transform, &AllCoresExecutor)
             }

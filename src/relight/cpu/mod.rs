@@ -4,7 +4,7 @@
 //! block has changed, the block's basis response is computed ([`correlation`]) and combined with the pixels'
 //! coefficients while it is in the cache ([`combine`]); the functions of direct tiles are summed slot by slot
 //! ([`windowed_sum`]). Other blocks keep their pixels, and so do blocks out of view. Blocks are independent, so threads share
-//! them.
+//! them. What is kept of a pixel is its linear light, or its code, a third of the memory ([`StoredPixel`]).
 //!
 //! A basis response is exact to about a millionth of the block's brightest element.
 
@@ -16,6 +16,7 @@ mod light_fft;
 mod origin_blocks;
 mod padded_light;
 mod simd;
+mod stored_pixel;
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
@@ -31,6 +32,8 @@ use correlation::{CorrelationScratch, Correlator};
 use origin_blocks::{DIRECT_BLOCK_SIDE, OriginBlock, OriginBlocks, OriginBoundingBox, PixelSpan};
 use padded_light::PaddedLight;
 use simd::{Simd, SimdKernel, SimdLevel};
+pub use stored_pixel::StoredPixel;
+use stored_pixel::{EncodedPixel, LinearPixel, PixelEncoder};
 
 /// The instructions that this build relights by.
 pub const KERNEL: &str = if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
@@ -44,9 +47,15 @@ pub const KERNEL: &str = if cfg!(all(target_arch = "wasm32", target_feature = "s
 /// Rows of the picture that are encoded at once.
 pub const STRIP_ROWS: usize = 64;
 
+/// A transport and its picture under the last light, in linear light.
+pub type LinearRelighter = CpuRelighter<LinearPixel>;
+
+/// A transport and its picture under the last light, after an output transform.
+pub type EncodedRelighter = CpuRelighter<EncodedPixel>;
+
 /// A transport and its picture under the last light.
 #[derive(Debug)]
-pub struct CpuRelighter {
+pub struct CpuRelighter<P: StoredPixel> {
     transport: Arc<Transport>,
     /// `None` where no tile is factored.
     correlator: Option<Correlator>,
@@ -57,7 +66,9 @@ pub struct CpuRelighter {
     /// Distance of each slot's light element from the window's first one.
     slot_offsets: Vec<u32>,
     /// The picture, block by block; locked one by one, as threads share the blocks.
-    linear: Vec<RwLock<Vec<[f32; CHANNELS]>>>,
+    pixels: Vec<RwLock<Vec<P>>>,
+    /// Makes stored pixels from linear ones.
+    encoder: P::Encoder,
     /// Quads of components in use.
     quads: usize,
     /// Whether each block is out of date, whatever has changed in the light since.
@@ -65,10 +76,17 @@ pub struct CpuRelighter {
     /// The pixels in view.
     view: TileRect,
     /// Memory of threads that are idle, kept from frame to frame.
-    scratch_pool: Mutex<Vec<CorrelationScratch>>,
+    scratch_pool: Mutex<Vec<BlockScratch>>,
 }
 
-impl CpuRelighter {
+/// Memory to relight a block in.
+#[derive(Debug, Default)]
+struct BlockScratch {
+    correlation: Option<CorrelationScratch>,
+    linear: Vec<LinearPixel>,
+}
+
+impl<P: StoredPixel> CpuRelighter<P> {
     /// Prepares a transport. The picture is dark until the first light.
     pub fn new(transport: Arc<Transport>) -> Self {
         let geometry = &transport.geometry;
@@ -90,9 +108,10 @@ impl CpuRelighter {
                 slot_offsets.push((row * light.stride() + column) as u32);
             }
         }
-        let dark = |block: &OriginBlock| RwLock::new(vec![[0.0; CHANNELS]; block.offsets.len()]);
+        let dark = |block: &OriginBlock| RwLock::new(vec![P::DARK; block.offsets.len()]);
         Self {
-            linear: blocks.blocks.iter().map(dark).collect(),
+            pixels: blocks.blocks.iter().map(dark).collect(),
+            encoder: P::Encoder::default(),
             quads,
             is_stale: vec![false; blocks.blocks.len()],
             view: TileRect {
@@ -183,13 +202,13 @@ impl CpuRelighter {
         }
         let this = &*self;
         executor.map(stale.len(), |i| {
-            let mut scratch = lock(&this.scratch_pool).pop();
+            let mut scratch = lock(&this.scratch_pool).pop().unwrap_or_default();
             SimdLevel::widest().run(BlockRelightKernel {
                 relighter: this,
                 block: stale[i],
                 scratch: &mut scratch,
             });
-            lock(&this.scratch_pool).extend(scratch);
+            lock(&this.scratch_pool).push(scratch);
         });
         self.light.clear_changes();
     }
@@ -200,16 +219,26 @@ impl CpuRelighter {
     }
 
     #[inline(always)]
-    fn relight_block<S: Simd>(
-        &self,
-        simd: S,
-        index: usize,
-        scratch: &mut Option<CorrelationScratch>,
-    ) {
+    fn relight_block<S: Simd>(&self, simd: S, index: usize, scratch: &mut BlockScratch) {
         let block = &self.blocks.blocks[index];
-        let mut linear = self.linear[index]
+        let mut pixels = self.pixels[index]
             .write()
             .unwrap_or_else(PoisonError::into_inner);
+        let linear = P::linear(&mut pixels, &mut scratch.linear);
+        self.compute(simd, block, &mut scratch.correlation, linear);
+        let spans = block.spans.iter().map(|span| (span.pixel, span.range()));
+        P::store(&self.encoder, &scratch.linear, spans, &mut pixels);
+    }
+
+    /// Relights a block.
+    #[inline(always)]
+    fn compute<S: Simd>(
+        &self,
+        simd: S,
+        block: &OriginBlock,
+        scratch: &mut Option<CorrelationScratch>,
+        linear: &mut [LinearPixel],
+    ) {
         let [u, v] = block.at;
         let row = |r: usize| &self.light.elements_from(u, v + r)[..self.footprint];
         let chroma = LightChroma::of_rows((0..self.footprint).map(row));
@@ -244,7 +273,7 @@ impl CpuRelighter {
                 }
             }
         }
-        self.add_direct(block, &mut linear);
+        self.add_direct(block, linear);
     }
 
     #[inline(always)]
@@ -272,6 +301,19 @@ impl CpuRelighter {
         &self.transport.tiles[span.tile]
     }
 
+    fn for_each_span(&self, rows: Range<u32>, mut visit: impl FnMut(&PixelSpan, &[P])) {
+        for (block, pixels) in self.blocks.blocks.iter().zip(&self.pixels) {
+            let pixels = pixels.read().unwrap_or_else(PoisonError::into_inner);
+            for span in &block.spans {
+                if rows.contains(&span.pixel.y) {
+                    visit(span, &pixels[span.range()]);
+                }
+            }
+        }
+    }
+}
+
+impl LinearRelighter {
     /// The picture in linear light, in units of the measurement.
     pub fn linear(&self) -> LinearPicture {
         let camera = self.transport.geometry.camera;
@@ -327,30 +369,41 @@ impl CpuRelighter {
             });
         });
     }
+}
 
-    fn for_each_span(
-        &self,
-        rows: Range<u32>,
-        mut visit: impl FnMut(&PixelSpan, &[[f32; CHANNELS]]),
-    ) {
-        for (block, linear) in self.blocks.blocks.iter().zip(&self.linear) {
-            let linear = linear.read().unwrap_or_else(PoisonError::into_inner);
-            for span in &block.spans {
-                if rows.contains(&span.pixel.y) {
-                    visit(span, &linear[span.range()]);
-                }
-            }
+impl EncodedRelighter {
+    /// Sets the output transform, without which the picture is black; pixels follow with the next
+    /// [`update`](Self::update).
+    pub fn set_output(&mut self, output: &OutputTransform) {
+        if PixelEncoder::set(&mut self.encoder, output) {
+            self.is_stale.fill(true);
         }
+    }
+
+    /// Copies rows of the picture to `out`. Pixels out of view may be those of an earlier light.
+    ///
+    /// # Panics
+    /// If `out` is not as large as the rows.
+    pub fn copy_rows(&self, rows: Range<u32>, out: &mut [EncodedPixel]) {
+        let width = self.transport.geometry.camera.width as usize;
+        // Not `assert_eq`, whose formatting code modules would have to carry.
+        assert!(out.len() == rows.len() * width, "pixels of the rows");
+        out.fill(EncodedPixel::DARK);
+        let first = rows.start;
+        self.for_each_span(rows, |span, pixels| {
+            let at = (span.pixel.y - first) as usize * width + span.pixel.x as usize;
+            out[at..at + span.length].copy_from_slice(pixels);
+        });
     }
 }
 
-struct BlockRelightKernel<'a> {
-    relighter: &'a CpuRelighter,
+struct BlockRelightKernel<'a, P: StoredPixel> {
+    relighter: &'a CpuRelighter<P>,
     block: usize,
-    scratch: &'a mut Option<CorrelationScratch>,
+    scratch: &'a mut BlockScratch,
 }
 
-impl SimdKernel for BlockRelightKernel<'_> {
+impl<P: StoredPixel> SimdKernel for BlockRelightKernel<'_, P> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         self.relighter.relight_block(simd, self.block, self.scratch);

@@ -200,9 +200,10 @@ export class LeveledRenderer implements Renderer {
 
   async #load(id: ShardId, signal: AbortSignal): Promise<void> {
     const { photograph } = this;
+    const quads = this.#quads;
+    const maxTileBytes = quads * QUAD_BYTES * this.pixels;
+    const release = cache.reserve(maxTileBytes + BYTES_PER_PIXEL * this.pixels);
     try {
-      const quads = this.#quads;
-      const maxTileBytes = quads * QUAD_BYTES * this.pixels;
       const loaded = await openShard(photograph, this.#table, id, maxTileBytes, signal);
       if (!loaded) return;
       const shard = new Shard(id, this.#table.rectOf(id), loaded, quads, () => this.#free(shard));
@@ -228,6 +229,8 @@ export class LeveledRenderer implements Renderer {
         this.#layer.report(error);
       }
       throw error;
+    } finally {
+      release();
     }
   }
 

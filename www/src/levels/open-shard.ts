@@ -4,7 +4,10 @@ import type { LoadedPhotograph } from '../photo/photograph.js';
 import type { PhotoInfo } from '../shared/value-types.js';
 import type { LevelTable, ShardId } from './level-table.js';
 
-/** Memory for a pixel beside its tiles: the canvas, its copy in a worker, and the picture in linear light. */
+/**
+ * Memory for a pixel beside its tiles: the canvas, two copies of its pixels on the way from a worker, and there the window
+ * origins and the light.
+ */
 export const BYTES_PER_PIXEL = 20;
 
 /** Memory of a photograph that is drawn. */

@@ -24,6 +24,22 @@ test('the least recently seen go first', () => {
   assert.deepEqual(evicted, ['b']);
 });
 
+test('a shard that is to be loaded has room made for it', () => {
+  const { cache, add, evicted } = createCache();
+  const [a, b] = [add('a'), add('b')];
+  cache.show('element', [b], new Set([b]));
+  const release = cache.reserve(40);
+  assert.deepEqual(evicted, ['a']);
+  const c = add('c');
+  cache.show('element', [c], new Set([c]));
+  assert.deepEqual(evicted, ['a', 'b']);
+  release();
+  const d = add('d');
+  cache.show('element', [c, d], new Set([c, d]));
+  assert.deepEqual(evicted, ['a', 'b']);
+  assert.notEqual(a, b);
+});
+
 test('what an element shows and does not need stays only if there is room', () => {
   const { cache, add, evicted } = createCache();
   const [a, b] = [add('a'), add('b')];

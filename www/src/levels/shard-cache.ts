@@ -18,11 +18,22 @@ export class ShardCache {
   readonly #shards = new Set<CachedShard>();
   /** Those that an element needs. */
   readonly #kept = new Map<unknown, ReadonlySet<CachedShard>>();
+  /** Bytes of shards that are being loaded. */
+  #reservedBytes = 0;
 
   constructor(readonly maxBytes = memoryLimit(MAX_BYTES, MAX_BYTES_PER_GIB)) {}
 
   add(shard: CachedShard): void {
     this.#shards.add(shard);
+  }
+
+  /** Makes room for a shard that is to be loaded. The returned function gives the room back, once. */
+  reserve(bytes: number): () => void {
+    this.#reservedBytes += bytes;
+    this.#makeRoom();
+    return () => {
+      this.#reservedBytes -= bytes;
+    };
   }
 
   /** `owner` shows these, and no others. Those of `kept` are not freed. */
@@ -45,7 +56,7 @@ export class ShardCache {
   }
 
   #makeRoom(): void {
-    let excess = -this.maxBytes;
+    let excess = this.#reservedBytes - this.maxBytes;
     for (const { bytes } of this.#shards) excess += bytes;
     for (const shard of [...this.#shards]) {
       if (excess <= 0) return;
