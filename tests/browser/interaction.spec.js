@@ -238,7 +238,8 @@ test.describe('zooming', () => {
   test('pans with Shift, with the middle button and with Space, but only when zoomed in', async ({
     openPage,
   }) => {
-    const { page, at } = await visit(openPage, { zoom: '' });
+    // The picture does not glide on.
+    const { page, at } = await visit(openPage, { zoom: '' }, { reducedMotion: 'reduce' });
     const xAfterDrag = async (/** @type {'left' | 'middle'} */ button = 'left') => {
       await drag(page, at(0.5, 0.5), at(0.6, 0.5), button);
       return (await viewOf(page)).x;
@@ -264,6 +265,38 @@ test.describe('zooming', () => {
     );
     await page.evaluate('photo.view = { zoom: 1, x: 0.5, y: 0.5 }');
     expect(await xAfterDrag()).toBe(0.5);
+  });
+});
+
+test.describe('a magnified picture', () => {
+  test('that is released in motion glides on until it is pressed', async ({ openPage }) => {
+    const { page, at } = await visit(openPage, { zoom: '', light: 'flood' });
+    await page.evaluate('photo.view = { zoom: 8, x: 0.5, y: 0.5 }');
+    await drag(page, at(0.2, 0.5), at(0.3, 0.5));
+    // The drag itself moves it by a tenth of an eighth.
+    await waitUntil(page, 'photo.view.x < 0.48');
+    await page.mouse.down();
+    const { x } = await viewOf(page);
+    await waitForFrames(page, 3);
+    expect((await viewOf(page)).x).toBe(x);
+    await page.mouse.up();
+  });
+
+  test('has a pixel of the screen for each of its own by key and by script', async ({
+    openPage,
+  }) => {
+    const { page, at } = await visit(openPage, { zoom: '' });
+    await page.evaluate("photo.style.width = '24px'");
+    const point = at(0.01, 0.01);
+    await page.mouse.click(point.x, point.y);
+    await page.keyboard.press('1');
+    const zoom = Number(await page.evaluate('photo.info.width / 24 / devicePixelRatio'));
+    expect((await viewOf(page)).zoom).toBeCloseTo(zoom, 2);
+    await page.evaluate('photo.view = { scale: 0.75, x: 0.4 }');
+    expect((await viewOf(page)).zoom).toBeCloseTo(0.75 * zoom, 2);
+    await page.evaluate('photo.viewTo({ scale: 1 }, { duration: 0 })');
+    await waitUntil(page, `Math.abs(photo.view.zoom - ${zoom}) < 0.01`);
+    expect((await viewOf(page)).x).toBe(0.4);
   });
 });
 

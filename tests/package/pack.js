@@ -30,6 +30,7 @@ const SCRIPTS = [
     '-sources',
     '-input',
     '-levels',
+    '-minimap',
   ].map((part) => `relightable-photo${part}`),
   ...['fr', 'de', 'it', 'es', 'ja', 'zh', 'zh-hant'].map(
     (language) => `relightable-photo-${language}`,

@@ -34,4 +34,4 @@ export { BACKENDS, LIGHTS } from './shared/keywords.js';
 export type { PicturePoint } from './shared/value-types.js';
 export type { LoadingMode, RevealMode } from './state/attribute-parsers.js';
 export type { LightOptions, LightValue } from './state/page-light.js';
-export type { PictureRect, ZoomView } from './state/viewport.js';
+export type { PictureRect, ViewChange, ZoomView } from './state/viewport.js';

@@ -29,6 +29,7 @@ const LAZY_SCRIPTS = new Map([
   ['photo/main-thread-decoder', 'relightable-photo-decoder'],
   ['lights/image-light-entry', 'relightable-photo-sources'],
   ['input/interaction', 'relightable-photo-input'],
+  ['input/minimap', 'relightable-photo-minimap'],
   ['levels/leveled-renderer', 'relightable-photo-levels'],
   ['ui/toolbar', 'relightable-photo-controls'],
   ...['fr', 'de', 'it', 'es', 'ja', 'zh', 'zh-hant'].map(

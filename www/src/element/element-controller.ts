@@ -24,7 +24,13 @@ import { AttributeReader } from '../state/attribute-reader.js';
 import { type ElementOptions, readOptions } from '../state/options.js';
 import { checkFields, type LightValue } from '../state/page-light.js';
 import { ViewerState } from '../state/viewer-state.js';
-import { clampView, type PictureRect, viewOf, type ZoomView } from '../state/viewport.js';
+import {
+  clampView,
+  type PictureRect,
+  type ViewChange,
+  viewOf,
+  type ZoomView,
+} from '../state/viewport.js';
 import { ShadowDom } from '../ui/shadow-dom.js';
 import { ViewerUi } from '../ui/viewer-ui.js';
 import { EarlyInput } from './early-input.js';
@@ -195,14 +201,14 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     else this.setLight(light);
   }
 
-  async viewTo(view: Partial<ZoomView> | PictureRect, options: TransitionOptions): Promise<void> {
+  async viewTo(view: ViewChange | PictureRect, options: TransitionOptions): Promise<void> {
     const target = this.#completeView(view);
     if (!this.#interaction) await this.#fetchInput();
     if (this.#interaction) await this.#interaction.viewTo(target, options);
     else this.setView(target);
   }
 
-  setView(view: Partial<ZoomView>): void {
+  setView(view: ViewChange): void {
     const target = this.#completeView(view);
     this.#interaction?.stopView();
     this.state.view = target;
@@ -210,12 +216,12 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
   }
 
   /** The current view with other values. @throws {TypeError} for an invalid field */
-  #completeView(wanted: Partial<ZoomView> | PictureRect): ZoomView {
-    checkFields(wanted, 'view', ['zoom', 'x', 'y', 'width', 'height']);
-    const view = 'width' in wanted ? viewOf(wanted) : wanted;
+  #completeView(wanted: ViewChange | PictureRect): ZoomView {
+    checkFields(wanted, 'view', ['zoom', 'scale', 'x', 'y', 'width', 'height']);
+    const view: ViewChange = 'width' in wanted ? viewOf(wanted) : wanted;
     const { maxZoom } = this.readOptions();
     const last = this.state.view;
-    const zoom = view.zoom ?? last.zoom;
+    const { scale, zoom = scale ? scale * this.#dom.actualSizeZoom : last.zoom } = view;
     if (zoom > 1 && maxZoom === 1) {
       const message = `A view with zoom ${zoom} shows the whole picture: set the zoom attribute.`;
       this.warn(new PhotoError('attribute', message));
@@ -270,6 +276,8 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
         this.#interaction = new InteractionController(this.state, this.#dom, this.#viewerUi, {
           changed: () => this.schedule(),
           expired: () => this.reset(),
+          frameNeeded: () => this.session.redraw(),
+          failed: (error) => this.warn(error),
         });
         if (this.#isMarkedActive) this.#interaction.markActive();
         this.#earlyInput.replay();
@@ -367,6 +375,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     this.#fetchInput();
     if (!reveal.isDrawn) this.schedule();
     reveal.isDrawn = true;
+    this.#interaction?.frameDrawn();
     const { setting, activeSource } = light;
     if (lightApplied && activeSource && drawn.image === setting.image) {
       this.#reportLight(this.#lightChanges.drawn(setting.name, activeSource));

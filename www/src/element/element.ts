@@ -8,7 +8,13 @@ import type { PhotoError } from '../shared/errors.js';
 import type { Backend, Gamut, LightName } from '../shared/keywords.js';
 import type { PhotoInfo, PicturePoint } from '../shared/value-types.js';
 import type { LightValue } from '../state/page-light.js';
-import { type PictureRect, pointAt, positionOf, type ZoomView } from '../state/viewport.js';
+import {
+  type PictureRect,
+  pointAt,
+  positionOf,
+  type ViewChange,
+  type ZoomView,
+} from '../state/viewport.js';
 import { ElementController } from './element-controller.js';
 import { encodePicture } from './encode-picture.js';
 import type { RelightablePhotoEventMap } from './events.js';
@@ -74,6 +80,7 @@ export interface StateOptions {
  * @csspart menu - The light menu.
  * @csspart button - Each button.
  * @csspart torch-handle - The torch, for the keyboard's focus.
+ * @csspart minimap - The overview that `minimap` asks for.
  * @csspart hint - The hint that explains how to zoom with `cooperative-gestures`.
  * @csspart status - The announcements for screen readers.
  *
@@ -173,12 +180,12 @@ export class RelightablePhotoElement extends Base {
 
   /**
    * The visible part of the picture, `{ zoom, x, y }`: a magnification of at most `zoom`, and its centre. Absent fields
-   * keep their values.
+   * keep their values. With `scale` in place of `zoom`, a pixel of the picture is `scale` pixels of the screen wide.
    */
   get view(): ZoomView {
     return this.#state.view;
   }
-  set view(view: Partial<ZoomView>) {
+  set view(view: ViewChange) {
     this.#controller.setView(view);
   }
 
@@ -195,7 +202,7 @@ export class RelightablePhotoElement extends Base {
    * Moves to another `view`, or to the part of the picture `{ x, y, width, height }`, whose corner and size are fractions of
    * the picture. Resolves as `lightTo` does.
    */
-  viewTo(view: Partial<ZoomView> | PictureRect, options: TransitionOptions = {}): Promise<void> {
+  viewTo(view: ViewChange | PictureRect, options: TransitionOptions = {}): Promise<void> {
     return this.#controller.viewTo(view, options);
   }
 

@@ -75,6 +75,8 @@ export interface ReflectedProperties {
    * With `zoom`: the wheel zooms with Ctrl or ⌘ only, one finger scrolls the page, two fingers zoom; a hint says so.
    */
   cooperativeGestures: boolean;
+  /** Shows an overview while the picture is magnified, in which the visitor can point at another part. */
+  minimap: boolean;
   /** The torch wanders slowly until a visitor takes it, and again after eight seconds without input. */
   autoplayLight: boolean;
   /** Resets everything after this many seconds without input; 60 if the attribute has no value, never at 0. */
@@ -114,6 +116,7 @@ const REFLECTED: {
   controls: flag('controls'),
   zoom: number('zoom', EMPTY_ZOOM),
   cooperativeGestures: flag('cooperative-gestures'),
+  minimap: flag('minimap'),
   autoplayLight: flag('autoplay-light'),
   kiosk: number('kiosk'),
   crossOrigin: { ...parsed('crossorigin'), set: (value) => value },

@@ -7,16 +7,21 @@ const ALL: EnabledGestures = { movesLight: true, zooms: true, isZoomed: true };
 /** A recognizer, and the calls of its listener since the last check. */
 function createRecognizer() {
   const log: string[] = [];
+  let holds = 0;
   const round = (...values: number[]) => values.map((value) => Math.round(100 * value) / 100);
   const recognizer = new GestureRecognizer({
     moveLight: (x, y) => log.push(`light ${x} ${y}`),
     restoreLight: () => log.push('restore'),
     throwLight: ({ x, y }) => log.push(`throw ${round(x, y).join(' ')}`),
     pan: (dx, dy) => log.push(`pan ${dx} ${dy}`),
+    throwView: ({ x, y }) => log.push(`throw view ${round(x, y).join(' ')}`),
+    holdView: () => {
+      holds += 1;
+    },
     zoom: (factor, x, y) => log.push(`zoom ${round(factor).join()} at ${x} ${y}`) > 0,
     doubleTap: (x, y) => log.push(`double ${x} ${y}`),
   });
-  return { recognizer, calls: () => log.splice(0) };
+  return { recognizer, calls: () => log.splice(0), holds: () => holds };
 }
 
 function at(
@@ -103,11 +108,29 @@ test('drags pan on request, and where no light can be moved', () => {
   assert.deepEqual(calls(), ['pan 5 3']);
   recognizer.down(at(0, 0), { ...ALL, movesLight: false });
   recognizer.move(at(20, 0, 10), { ...ALL, movesLight: false });
-  recognizer.up(at(20, 0, 11), { ...ALL, movesLight: false });
+  recognizer.up(at(20, 0, 500), { ...ALL, movesLight: false });
   assert.deepEqual(calls(), ['pan 20 0']);
   recognizer.down(at(0, 0), { movesLight: false, zooms: true, isZoomed: false });
   recognizer.move(at(20, 0, 10), { movesLight: false, zooms: true, isZoomed: false });
   assert.deepEqual(calls(), []);
+});
+
+test('a picture that is released in motion glides on until it is pressed', () => {
+  const { recognizer, calls, holds } = createRecognizer();
+  recognizer.down(at(0, 0), ALL, true);
+  for (let i = 1; i <= 5; i += 1) recognizer.move(at(0, -20 * i, 10 * i), ALL);
+  calls();
+  recognizer.up(at(0, -100, 55), ALL);
+  assert.deepEqual(calls(), ['throw view 0 -2000']);
+  assert.equal(holds(), 1);
+  recognizer.down(at(0, 0, 100), ALL);
+  assert.equal(holds(), 2);
+  const whole = { ...ALL, movesLight: false, isZoomed: false };
+  recognizer.cancel(1);
+  recognizer.down(at(0, 0, 200), whole);
+  recognizer.move(at(40, 0, 210), whole);
+  recognizer.up(at(40, 0, 212), whole);
+  assert.deepEqual(calls(), ['light 0 0'], 'the whole picture cannot be panned');
 });
 
 test('two quick taps at one place are a double tap', () => {

@@ -26,6 +26,10 @@ export interface GestureListener {
   /** The light was released in motion. */
   throwLight(velocity: Velocity): void;
   pan(dx: number, dy: number): void;
+  /** The picture was released in motion while it was panned. */
+  throwView(velocity: Velocity): void;
+  /** The picture was pressed: it does not glide on. */
+  holdView(): void;
   /** Magnify by `factor` around a point. Returns whether the view has changed. */
   zoom(factor: number, x: number, y: number): boolean;
   doubleTap(x: number, y: number): void;
@@ -34,7 +38,7 @@ export interface GestureListener {
 const DOUBLE_TAP_MS = 320;
 /** A pointer that moves farther than this does not tap. */
 const MAX_TAP_PIXELS = 12;
-/** Releasing a faster drag throws the light. Pixels per second. */
+/** Releasing a faster drag throws the light or the picture. Pixels per second. */
 const MIN_THROW_SPEED = 120;
 /** Hands tremble: after a throw, the mouse takes the light again only after this distance. */
 const MIN_HOVER_PIXELS = 8;
@@ -65,13 +69,14 @@ export class GestureRecognizer {
   /** `forcePan`: a modifier key or another button requests panning. */
   down({ id, x, y, time }: PointerSample, allowed: EnabledGestures, forcePan = false): void {
     this.#throwPoint = null;
+    this.listener.holdView();
     const pans = forcePan || !allowed.movesLight;
     this.#pressed.set(id, { x, y, startX: x, startY: y, pans, hasMoved: false });
     if (this.#pressed.size === 1) {
       this.#hasPinched = false;
       this.#velocity = new VelocityTracker();
-      if (pans) return;
       this.#velocity.add(x, y, time);
+      if (pans) return;
       this.listener.moveLight(x, y);
     } else if (allowed.zooms && !this.#hasPinched) {
       this.#hasPinched = true;
@@ -101,6 +106,7 @@ export class GestureRecognizer {
     } else if (this.#hasPinched) {
       // Ignore the remaining finger of a pinch.
     } else if (pointer.pans) {
+      this.#velocity.add(x, y, time);
       if (allowed.isZoomed) this.listener.pan(dx, dy);
     } else if (allowed.movesLight && id === this.#pressed.keys().next().value) {
       this.#velocity.add(x, y, time);
@@ -119,9 +125,13 @@ export class GestureRecognizer {
     }
     this.#lastTap = null;
     const velocity = this.#velocity.velocityAt(time);
-    if (pointer.pans || !allowed.movesLight || speedOf(velocity) < MIN_THROW_SPEED) return;
-    this.#throwPoint = { x, y };
-    this.listener.throwLight(velocity);
+    if (speedOf(velocity) < MIN_THROW_SPEED) return;
+    if (pointer.pans) {
+      if (allowed.isZoomed) this.listener.throwView(velocity);
+    } else if (allowed.movesLight) {
+      this.#throwPoint = { x, y };
+      this.listener.throwLight(velocity);
+    }
   }
 
   /** The browser uses the pointer for itself, for example for scrolling. */

@@ -33,6 +33,9 @@ export class VelocityTracker {
   }
 }
 
+/** A glide ends below this speed, in pictures or views per second. */
+export const MIN_GLIDE_SPEED = 0.02;
+
 /** The distance travelled in `seconds`, and the velocity afterwards. */
 export function glide({ x, y }: Velocity, seconds: number) {
   const decay = Math.exp(-seconds / DECAY_SECONDS);

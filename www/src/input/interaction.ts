@@ -3,6 +3,7 @@
  * separate script, because the first picture needs none of it.
  */
 
+import { missingScript, type PhotoError } from '../shared/errors.js';
 import { callLater } from '../shared/promises.js';
 import { CENTRE, type PicturePoint } from '../shared/value-types.js';
 import type { ViewerState } from '../state/viewer-state.js';
@@ -22,11 +23,12 @@ import type { ViewerUi } from '../ui/viewer-ui.js';
 import { AnimationLoop } from './animation-loop.js';
 import type { EnabledGestures } from './gestures.js';
 import { IdleTimer } from './idle-timer.js';
-import type { Velocity } from './inertia.js';
+import { glide, MIN_GLIDE_SPEED, speedOf, type Velocity } from './inertia.js';
 import INPUT_CSS from './input.css';
 import { type FocusedPart, type KeyAction, keyAction } from './keys.js';
 import { LightAnimator } from './light-animator.js';
 import { describeLight } from './light-description.js';
+import type { Minimap } from './minimap.js';
 import { listenToPointer, toViewportUnits } from './pointer-input.js';
 import { reducedMotion } from './reduced-motion.js';
 import { isTiltSupported, TiltSensor } from './tilt-sensor.js';
@@ -44,6 +46,9 @@ export interface InteractionCallbacks {
   changed(): void;
   /** The kiosk's time without input is over. */
   expired(): void;
+  /** The picture is to be drawn again: the canvas of a graphics device keeps it only until the next frame. */
+  frameNeeded(): void;
+  failed(error: PhotoError): void;
 }
 
 export class InteractionController {
@@ -59,6 +64,8 @@ export class InteractionController {
   /** The torch handle has the keyboard's focus: a light that a screen reader describes must not move. */
   #isHandleFocused = false;
   #torchBeforeMove: PicturePoint | null = null;
+  #minimap: Minimap | null = null;
+  #minimapFetch: Promise<void> | null = null;
 
   constructor(
     private readonly state: ViewerState,
@@ -102,11 +109,18 @@ export class InteractionController {
       this.#isHandleFocused ||
       this.#tilt.isActive ||
       this.#transitions.isRunning('light');
+    this.#updateMinimap();
     const isAnimated = isPlaying && isPictureShown;
     this.#animator.update({
       fire: isAnimated && light.isFire,
       wander: isAnimated && options.autoplayLight && light.isTorch && !isInUse,
     });
+  }
+
+  /** The canvas has another picture. */
+  frameDrawn(): void {
+    const canvas = this.dom.content.querySelector('canvas');
+    if (canvas) this.#minimap?.draw(canvas);
   }
 
   markActive(byKeyboard = false): void {
@@ -148,6 +162,7 @@ export class InteractionController {
 
   stopView(): void {
     this.#transitions.end('view');
+    this.#loop.set('view glide', null);
   }
 
   /** Lets the torch move from its current position to that of the light which `set` sets. */
@@ -223,6 +238,8 @@ export class InteractionController {
         const moved = toUnits(dx, dy);
         this.#setView(pan(state.view, moved.x, moved.y));
       },
+      holdView: () => this.stopView(),
+      throwView: ({ x, y }: Velocity) => this.#throwView(toUnits(x, y)),
       zoom: (factor, x, y) => this.#zoomAt(factor, toUnits(x, y)),
       doubleTap: (x, y) =>
         this.#setView(toggleZoom(state.view, toUnits(x, y), state.options.maxZoom)),
@@ -267,6 +284,43 @@ export class InteractionController {
     this.stopTorch();
     this.state.light.torch = point;
     this.listener.changed();
+  }
+
+  /** Lets the view glide on; the velocity is in views per second. */
+  #throwView(initial: Velocity): void {
+    if (reducedMotion().matches) return;
+    let velocity = initial;
+    this.#loop.set('view glide', (seconds) => {
+      const next = glide(velocity, seconds);
+      velocity = next.velocity;
+      const last = this.state.view;
+      this.state.view = pan(last, next.moved.x, next.moved.y);
+      this.listener.changed();
+      // The first frame has no duration.
+      const isMoving = seconds === 0 || this.state.view !== last;
+      return isMoving && speedOf(velocity) > MIN_GLIDE_SPEED;
+    });
+  }
+
+  /** The overview of a magnified picture, for elements with the attribute. */
+  #updateMinimap(): void {
+    const { options, view, isPictureShown } = this.state;
+    const isShown = options.minimap && isPictureShown && view.zoom > 1;
+    if (!isShown || this.#minimap) {
+      if (this.#minimap?.show(isShown ? view : null)) this.listener.frameNeeded();
+      return;
+    }
+    this.#minimapFetch ??= import('./minimap.js').then(
+      ({ Minimap }) => {
+        this.#minimap = new Minimap(this.dom, (x, y) => {
+          this.markActive();
+          this.#setView({ ...this.state.view, x, y });
+        });
+        this.listener.changed();
+      },
+      (cause: unknown) =>
+        this.listener.failed(missingScript('minimap-unavailable', 'the overview', cause)),
+    );
   }
 
   #zoomAt(factor: number, at: PicturePoint): boolean {
@@ -323,6 +377,8 @@ export class InteractionController {
         return options.maxZoom > 1;
       case 'reset-view':
         return this.#setView(FULL_VIEW);
+      case 'actual-size':
+        return this.#setView({ ...view, zoom: this.dom.actualSizeZoom });
       case 'select-light':
         this.stopTorch();
         this.state.selectNextLight(action.by);

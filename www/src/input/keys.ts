@@ -9,7 +9,7 @@ export type KeyPress = Pick<
 export type KeyAction =
   | { readonly kind: 'move-light' | 'pan'; readonly dx: number; readonly dy: number }
   | { readonly kind: 'zoom' | 'select-light'; readonly by: 1 | -1 }
-  | { readonly kind: 'reset-view' | 'escape' };
+  | { readonly kind: 'reset-view' | 'actual-size' | 'escape' };
 
 /** The focused part: the torch handle, the picture (if no light can be moved), or the controls. */
 export type FocusedPart = 'light' | 'picture' | 'controls';
@@ -56,6 +56,7 @@ export function keyAction(press: KeyPress, focus: FocusedPart): KeyAction | null
 function zoomAction(key: string): KeyAction | null {
   if (key === '+' || key === '=') return { kind: 'zoom', by: 1 };
   if (key === '-' || key === '_') return { kind: 'zoom', by: -1 };
+  if (key === '1') return { kind: 'actual-size' };
   return key === '0' ? { kind: 'reset-view' } : null;
 }
 

@@ -3,11 +3,8 @@
 import { CENTRE } from '../shared/value-types.js';
 import type { LightState } from '../state/light-state.js';
 import type { AnimationCallback, AnimationLoop } from './animation-loop.js';
-import { glide, speedOf, type Velocity } from './inertia.js';
+import { glide, MIN_GLIDE_SPEED, speedOf, type Velocity } from './inertia.js';
 import { wander } from './wander.js';
-
-/** A glide ends below this speed, in pictures per second. */
-const MIN_GLIDE_SPEED = 0.02;
 
 export class LightAnimator {
   constructor(

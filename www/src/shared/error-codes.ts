@@ -146,6 +146,12 @@ export interface ScriptFaults {
    */
   'levels-unavailable': true;
   /**
+   * The script of the overview, which the `minimap` attribute asks for, could not be loaded.
+   * @visitor the picture without an overview.
+   * @remedy Copy the whole `dist` folder, and do not rename its files: the scripts load each other by name.
+   */
+  'minimap-unavailable': true;
+  /**
    * The decoder's worker stopped, mostly because memory ran out.
    * @visitor a message while the photograph loads.
    * @remedy Close other tabs. Make a smaller file with `ltm-export recover --max-bytes`, or with fewer camera

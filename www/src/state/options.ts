@@ -48,6 +48,7 @@ function readAttributes(reader: AttributeReader, side: number) {
     maxZoom:
       reader.read('zoom') ?? (side > 0 ? Math.max(EMPTY_ZOOM, side / MIN_BOX_PIXELS) : MAX_ZOOM),
     cooperativeGestures: reader.has('cooperative-gestures'),
+    minimap: reader.has('minimap'),
     autoplayLight: reader.has('autoplay-light'),
     kioskSeconds: reader.read('kiosk'),
     crossOrigin: reader.read('crossorigin'),

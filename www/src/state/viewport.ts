@@ -14,6 +14,12 @@ export interface ZoomView {
   readonly y: number;
 }
 
+/** Fields of another view. */
+export interface ViewChange extends Partial<ZoomView> {
+  /** In place of `zoom`: pixels of the screen along the side of a pixel of the picture. */
+  readonly scale?: number;
+}
+
 /** A part of the picture: its top left corner and its size, as fractions of the picture. */
 export interface PictureRect {
   readonly x: number;

@@ -174,6 +174,12 @@ export class ShadowDom {
     return new DOMRectReadOnly(box.left - left, box.top - top, box.width, box.height);
   }
 
+  /** The magnification that gives each pixel of the picture one of the screen; 1 without a picture. */
+  get actualSizeZoom(): number {
+    const pixels = devicePixelRatio * this.viewport.getBoundingClientRect().width;
+    return (this.#pictureSize?.width ?? pixels) / pixels || 1;
+  }
+
   /** Removes the canvas, the progress bar and the message. */
   clear(): void {
     this.viewport.classList.remove('has-picture');
