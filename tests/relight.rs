@@ -185,7 +185,8 @@ fn pixels_out_of_view_follow_once_they_are_in_view() {
         extent: Extent::new(width, height),
     };
     let mut relighter = LinearRelighter::new(transport.clone());
-    let output = OutputTransform::srgb(1.0);
+    let mut encoded = EncodedRelighter::new(transport.clone());
+    let outputs = relit::output_transforms(1.5);
     let views = [
         view(0, 0, 90, 70),
         view(20, 10, 30, 20),
@@ -201,6 +202,13 @@ fn pixels_out_of_view_follow_once_they_are_in_view() {
         let (name, light) = &lights[i.min(views.len() - 2) % lights.len()];
         relighter.set_quality([1.0, 0.5][i % 2]);
         relighter.relight(light, &SequentialExecutor);
+        let output = outputs[i % 3];
+        encoded.set_view(view);
+        encoded.set_quality([1.0, 0.5][i % 2]);
+        encoded.set_output(&output);
+        encoded.relight(light, &SequentialExecutor);
+        let mut codes = vec![[0; 4]; geometry.camera.area()];
+        encoded.copy_rows(0..70, &mut codes);
         let mut fresh = LinearRelighter::new(transport.clone());
         fresh.set_quality([1.0, 0.5][i % 2]);
         fresh.relight(light, &SequentialExecutor);
@@ -215,6 +223,7 @@ fn pixels_out_of_view_follow_once_they_are_in_view() {
                 let at = geometry.camera.index(CameraPixel { x, y });
                 if is_in {
                     assert_eq!(got.pixels[at], want.pixels[at], "{name}: {x}, {y}");
+                    assert_eq!(codes[at], want.pixels[at], "{name}: {x}, {y}");
                 }
             }
         }

@@ -69,7 +69,7 @@ pub fn run(args: &EncodeArgs) -> Result<()> {
     let fetch = |chunk: ChunkId| {
         let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
         let bytes = read_range(&mut file, index.range(chunk));
-        bytes.map_err(|error| FormatError::Source(io::Error::other(format!("{error:#}"))))
+        bytes.map_err(|error| FormatError::Source(io::Error::other(InputError(error))))
     };
     let camera = index.header.geometry.camera;
     let levels = levels_of(args.levels, camera).with_context(name)?;

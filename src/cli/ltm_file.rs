@@ -1,12 +1,12 @@
 //! Reading `.ltm` files: whole, a prefix, or the file index only.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::num::ParseFloatError;
 use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 
 use super::value_parsers::ByteCount;
 use crate::format::{
@@ -26,6 +26,21 @@ pub struct LtmFile {
     pub index: FileIndex,
     pub transport: Transport,
     pub progress: ReadProgress,
+}
+
+/// Why a file is not read, beside what the format says.
+#[derive(Debug, thiserror::Error)]
+pub enum LtmFileError {
+    #[error("is a folder, not an .ltm file")]
+    Folder,
+    #[error("cannot be opened: {0}")]
+    Open(io::Error),
+    #[error("{error:#} (--first {intact} reads the part before the damage)")]
+    DamagedEnd {
+        error: anyhow::Error,
+        /// Bytes before the damage.
+        intact: u64,
+    },
 }
 
 /// Reads and checks an `.ltm` file of one level, or its prefix `first`.
@@ -51,7 +66,7 @@ pub fn read_ltm(path: &Path, first: Option<PrefixLength>) -> Result<LtmFile> {
         });
         let (transport, _) = transport.map_err(|error| match intact_bytes(&index, &error) {
             Some(intact) if intact > index.header.index_bytes() => {
-                anyhow!("{error:#} (--first {intact} reads the part before the damage)")
+                LtmFileError::DamagedEnd { error, intact }.into()
             }
             _ => error,
         })?;
@@ -124,9 +139,11 @@ pub fn read_range(file: &mut File, range: Range<u64>) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn open(path: &Path) -> Result<File> {
-    ensure!(!path.is_dir(), "is a folder, not an .ltm file");
-    File::open(path).context("cannot be opened")
+fn open(path: &Path) -> Result<File, LtmFileError> {
+    if path.is_dir() {
+        return Err(LtmFileError::Folder);
+    }
+    File::open(path).map_err(LtmFileError::Open)
 }
 
 /// Length of a prefix: in bytes, or in per cent of the file.

@@ -10,6 +10,7 @@ mod capture_writer;
 mod check;
 mod encode;
 mod evaluate;
+mod exit_status;
 mod field_suggestion;
 mod file_hash;
 mod finding;
@@ -76,11 +77,7 @@ pub fn definition() -> clap::Command {
     Cli::command()
 }
 
-/// Exit status for captures that `check` finds errors in, or `--strict` does not accept: `EX_DATAERR` of sysexits.
-const DATA_ERROR_STATUS: u8 = 65;
-
-/// Parses the command line and runs it. The exit status is 0 on success, 1 on failure, 2 for a wrong command line, 65 for
-/// errors in a capture that is checked and for warnings with `--strict`, 130 after an interruption.
+/// Parses the command line and runs it. The exit status is 0 on success, else that of [`exit_status`](exit_status::exit_status).
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Patterns(args) => patterns::run(&args),
@@ -106,18 +103,9 @@ pub fn main() -> ExitCode {
     };
     if error.is::<process_resources::Interrupted>() {
         eprintln!("{error:#}");
-        return ExitCode::from(process_resources::INTERRUPTED_STATUS);
+    } else if !error.is::<check::NotReadyError>() {
+        // `check` has reported why.
+        eprintln!("error: {}", advice::error_with_remedy(&error));
     }
-    // The report says why.
-    if error.is::<check::NotReadyError>() {
-        return ExitCode::from(DATA_ERROR_STATUS);
-    }
-    eprintln!("error: {}", advice::error_with_remedy(&error));
-    if error.is::<value_parsers::UsageError>() {
-        return ExitCode::from(2);
-    }
-    match error.is::<recover::StrictError>() {
-        true => ExitCode::from(DATA_ERROR_STATUS),
-        false => ExitCode::FAILURE,
-    }
+    ExitCode::from(exit_status::exit_status(&error))
 }

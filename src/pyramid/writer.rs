@@ -391,6 +391,6 @@ fn moved(rect: TileRect, [x, y]: [u32; 2]) -> TileRect {
 fn into_io(error: FormatError) -> io::Error {
     match error {
         FormatError::Source(error) | FormatError::Write(error) | FormatError::Spool(error) => error,
-        other => io::Error::other(other.to_string()),
+        other => io::Error::other(other),
     }
 }

@@ -280,6 +280,11 @@ test.describe('a magnified picture', () => {
     await waitForFrames(page, 3);
     expect((await viewOf(page)).x).toBe(x);
     await page.mouse.up();
+    await page.evaluate('photo.view = { zoom: 8, x: 0.5, y: 0.5 }');
+    await drag(page, at(0.2, 0.5), at(0.3, 0.5));
+    await page.evaluate('photo.viewTo({ zoom: 8, x: 0.6 }, { duration: 0 })');
+    await waitForFrames(page, 3);
+    expect((await viewOf(page)).x, 'a script stops it as well').toBe(0.6);
   });
 
   test('has a pixel of the screen for each of its own by key and by script', async ({

@@ -85,6 +85,20 @@ test.describe('a photograph of several levels', () => {
     expect(ranges(), 'shards stay in memory').toHaveLength(2 + NEXT);
   });
 
+  test('is fetched as far as object-fit shows it', async ({ openPage, server }) => {
+    const page = await openPage('/plain');
+    const src = `${SRC}?cover`;
+    await mountAt(page, WIDTH / 4, { src });
+    await page.evaluate(
+      "Object.assign(photo.style, { width: '80px', height: '80px', objectFit: 'cover', objectPosition: '0 0' })",
+    );
+    await waitUntil(page, `${shown(0)} === 1`);
+    // The root, one shard, and one of the coarser level.
+    expect(server.requestedRanges.get(src)).toHaveLength(3);
+    await page.evaluate("photo.style.objectPosition = '100% 0'");
+    await waitUntil(page, `${shown(0)} === 2`);
+  });
+
   test('has the light of the moment also where it was out of view', async ({ openPage }) => {
     const page = await openPage('/plain', { reducedMotion: 'reduce' });
     await mountAt(page, WIDTH, { backend: 'cpu', zoom: '16' });

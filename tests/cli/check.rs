@@ -326,7 +326,7 @@ fn a_broken_manifest_is_told_with_all_of_its_fields() {
 
     // A folder that is none is no finding.
     let nowhere = run(&["check", &text(&capture.path.join("nowhere"))]);
-    assert_eq!(nowhere.status.code(), Some(1));
+    assert_eq!(nowhere.status.code(), Some(65));
     assert!(String::from_utf8_lossy(&nowhere.stderr).contains("there is no such folder"));
 }
 

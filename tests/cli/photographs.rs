@@ -233,7 +233,7 @@ fn photographs_that_follow_from_nothing_are_written_by_force_only() {
     }
     let output = capture.recover(&["--method", "learned"]);
     let errors = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert_eq!(output.status.code(), Some(65), "{errors}");
     assert!(
         errors.contains("--force writes the file nevertheless"),
         "{errors}"

@@ -381,6 +381,17 @@ fn a_killed_recovery_resumes_and_mismatches_are_named() {
     refuses(&[], &["photos/0003.png in the capture has changed"]);
     fs::write(&photo, sound).unwrap();
 
+    // Another process has not finished.
+    let other = fs::File::open(&checkpoint).unwrap();
+    other.lock().unwrap();
+    let output = recovery
+        .recover("killed.ltm", &["--resume"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(75), "it may succeed later");
+    assert!(stderr_text(&output).contains("killed.ltm.checkpoint: is in use"));
+    drop(other);
+
     // A checkpoint of another build, with another learned prior.
     let prior = 20 + u32::from_le_bytes(kept[12..16].try_into().unwrap()) as usize;
     assert_eq!(kept[prior..prior + 4], (u32::MAX - 1).to_le_bytes());

@@ -3,10 +3,9 @@
 //! Other formats are refused: a lossy one would change the measurements. Photographs are decoded row by row, so that
 //! hundreds can be read in parallel without one of them in memory whole.
 
-use std::fmt::Display;
 use std::io::{BufRead, BufReader, ErrorKind, Seek};
 
-use png::{BitDepth, ColorType, Transformations};
+use png::{BitDepth, ColorType, DecodingError, Transformations};
 
 use super::files::{CaptureFile, CaptureFiles};
 use crate::capture::error::{CaptureError, CaptureErrorKind};
@@ -118,9 +117,17 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
         }
     }
 
-    fn unreadable(&self, reason: impl Display) -> CaptureError {
-        let reason = reason.to_string().trim_end_matches('.').to_owned();
-        self.error(CaptureErrorKind::Unreadable(reason))
+    fn unreadable(&self, error: DecodingError) -> CaptureError {
+        self.error(match error {
+            // The disk or the network is at fault, not the file.
+            DecodingError::IoError(e) if e.kind() != ErrorKind::UnexpectedEof => {
+                CaptureErrorKind::Io(e)
+            }
+            error => {
+                let reason = error.to_string().trim_end_matches('.').to_owned();
+                CaptureErrorKind::Unreadable(reason)
+            }
+        })
     }
 
     fn error(&self, problem: CaptureErrorKind) -> CaptureError {

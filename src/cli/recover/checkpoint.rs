@@ -71,6 +71,11 @@ pub fn compress_tile(record: &[u8]) -> io::Result<Vec<u8>> {
     zstd::bulk::compress(record, ZSTD_LEVEL)
 }
 
+/// Another process writes the same file.
+#[derive(Debug, thiserror::Error)]
+#[error("is in use: another process recovers to the same output; let it finish")]
+pub struct CheckpointInUseError;
+
 impl Checkpoint {
     /// Creates the checkpoint of the recovery to `output`, or opens an existing one if `resume` is set.
     pub fn open(output: &Path, key: &CheckpointKey, resume: bool) -> Result<Self> {
@@ -88,7 +93,7 @@ impl Checkpoint {
             .context("cannot be created; does its folder exist, and may you write there?")?;
         // A file system without locks is no reason to fail.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
-            bail!("is in use: another process recovers to the same output; let it finish");
+            bail!(CheckpointInUseError);
         }
         let bytes = file.metadata()?.len();
         let mut checkpoint = Self {

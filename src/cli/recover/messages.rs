@@ -48,6 +48,11 @@ pub struct StrictError;
 )]
 pub struct UnusableError(pub Decibels);
 
+/// The photographs do not show what the capture says.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct FaultyPhotographsError(pub String);
+
 /// The error for a `--patterns` above the number of shots.
 pub fn too_few_shots(TooFewShots { wanted, available }: TooFewShots) -> Error {
     anyhow!("--patterns is {wanted}, but the capture has {available} shots")
@@ -536,13 +541,14 @@ pub fn mismatched_shots(
 ) -> anyhow::Error {
     let listed = &folder.manifest().shots;
     let name = |i: usize| format!("shots[{i}] ({}, {})", listed[i].photo, listed[i].pattern);
-    anyhow!(
+    let message = format!(
         "{}: some photographs do not match the patterns they are listed with, while the others do: {}; \
          correct these shots or take them out; if there are many, check whether the correspondence is \
          mirrored",
         folder.manifest_path().display(),
         join_first(shots.map(name))
-    )
+    );
+    FaultyPhotographsError(message).into()
 }
 
 /// The first of some shots with their photographs, and how many more there are.

@@ -19,7 +19,8 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 
 pub use self::args::{MethodName, RecoverArgs, TrustedCalibration, WindowArg, parse_window};
-pub use self::messages::StrictError;
+pub use self::checkpoint::CheckpointInUseError;
+pub use self::messages::{FaultyPhotographsError, StrictError, UnusableError};
 pub use self::report::RecoverReport;
 
 use self::capture_sample::SampleSource;

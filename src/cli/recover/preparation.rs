@@ -6,7 +6,7 @@ use super::args::{RecoverArgs, TrustedCalibration};
 use super::calibration;
 use super::capture_sample::{CaptureSample, PhotographSource};
 use super::findings::Findings;
-use super::messages::{self, UnusableError};
+use super::messages::{self, FaultyPhotographsError, UnusableError};
 use crate::capture::{CameraResponse, CaptureFolder, CodeStatistics, Manifest};
 use crate::cli::finding::Finding;
 use crate::cli::progress;
@@ -136,7 +136,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         } = self.examine(sample, &mut findings)?;
         let prepared = match (prepared, &cause) {
             (Ok(prepared), _) => prepared,
-            (Err(_), Some(cause)) => bail!(cause.message.clone()),
+            (Err(_), Some(cause)) => bail!(FaultyPhotographsError(cause.message.clone())),
             (Err(error), None) => return Err(self.recover_error(error, &sample.shots)),
         };
         findings.add(messages::preparation(&prepared));
@@ -144,7 +144,8 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !args.force);
         match (cause, unusable) {
             (Some(cause), Some(_)) if !args.strict => {
-                bail!("{}; --force writes the file nevertheless", cause.message)
+                let message = format!("{}; --force writes the file nevertheless", cause.message);
+                bail!(FaultyPhotographsError(message))
             }
             (cause, _) => findings.add(cause),
         }

@@ -221,7 +221,8 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     const view: ViewChange = 'width' in wanted ? viewOf(wanted) : wanted;
     const { maxZoom } = this.readOptions();
     const last = this.state.view;
-    const { scale, zoom = scale ? scale * this.#dom.actualSizeZoom : last.zoom } = view;
+    const { scale, zoom = scale === undefined ? last.zoom : scale * this.#dom.actualSizeZoom } =
+      view;
     if (zoom > 1 && maxZoom === 1) {
       const message = `A view with zoom ${zoom} shows the whole picture: set the zoom attribute.`;
       this.warn(new PhotoError('attribute', message));
@@ -276,7 +277,10 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
         this.#interaction = new InteractionController(this.state, this.#dom, this.#viewerUi, {
           changed: () => this.schedule(),
           expired: () => this.reset(),
-          frameNeeded: () => this.session.redraw(),
+          overviewChanged: (isShown) => {
+            this.session.hasOverview = isShown;
+            this.session.redraw();
+          },
           failed: (error) => this.warn(error),
         });
         if (this.#isMarkedActive) this.#interaction.markActive();

@@ -10,6 +10,8 @@ export interface Velocity {
 const SAMPLE_WINDOW_MS = 100;
 /** A pointer that rests this long before release does not throw. */
 const MAX_REST_MS = 60;
+/** Samples of a shorter time are those of events that were kept until the script arrived. */
+const MIN_SAMPLED_MS = 4;
 /** τ: the velocity falls to 37 % in this time. */
 const DECAY_SECONDS = 0.28;
 
@@ -25,7 +27,12 @@ export class VelocityTracker {
   velocityAt(time: number): Velocity {
     const first = this.#samples[0];
     const last = this.#samples.at(-1);
-    if (!first || !last || time - last.time > MAX_REST_MS || last.time - first.time <= 0) {
+    if (
+      !first ||
+      !last ||
+      time - last.time > MAX_REST_MS ||
+      last.time - first.time < MIN_SAMPLED_MS
+    ) {
       return { x: 0, y: 0 };
     }
     const seconds = (last.time - first.time) / 1000;

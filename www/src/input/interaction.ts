@@ -41,13 +41,16 @@ import {
 } from './transitions.js';
 import { ZoomHint } from './zoom-hint.js';
 
+/** A glide that is limited by more than the rounding of views is at an edge of the picture. */
+const EDGE = 1e-3;
+
 export interface InteractionCallbacks {
   /** The light, the view, an animation or the focus has changed. */
   changed(): void;
   /** The kiosk's time without input is over. */
   expired(): void;
-  /** The picture is to be drawn again: the canvas of a graphics device keeps it only until the next frame. */
-  frameNeeded(): void;
+  /** The overview has appeared or disappeared. It needs a new frame, as graphics devices keep no picture. */
+  overviewChanged(isShown: boolean): void;
   failed(error: PhotoError): void;
 }
 
@@ -104,6 +107,7 @@ export class InteractionController {
     this.#idle.kioskSeconds = options.kioskSeconds;
     this.#loop.isEnabled = reveal.isVisible;
     if (!reveal.isVisible) this.#transitions.finish();
+    if (!reveal.isVisible || !isPictureShown || reducedMotion().matches) this.#stopGlide();
     const isInUse =
       this.#isActive ||
       this.#isHandleFocused ||
@@ -162,7 +166,7 @@ export class InteractionController {
 
   stopView(): void {
     this.#transitions.end('view');
-    this.#loop.set('view glide', null);
+    this.#stopGlide();
   }
 
   /** Lets the torch move from its current position to that of the light which `set` sets. */
@@ -175,8 +179,10 @@ export class InteractionController {
 
   /** Moves to another view. */
   viewTo(view: ZoomView, options: TransitionOptions): Promise<void> {
+    const ms = durationOf(options);
+    this.stopView();
     const from = this.state.view;
-    return this.#run('view', durationOf(options), (at) => {
+    return this.#run('view', ms, (at) => {
       this.state.view = viewBetween(from, view, at);
     });
   }
@@ -238,7 +244,7 @@ export class InteractionController {
         const moved = toUnits(dx, dy);
         this.#setView(pan(state.view, moved.x, moved.y));
       },
-      holdView: () => this.stopView(),
+      holdView: () => this.#stopGlide(),
       throwView: ({ x, y }: Velocity) => this.#throwView(toUnits(x, y)),
       zoom: (factor, x, y) => this.#zoomAt(factor, toUnits(x, y)),
       doubleTap: (x, y) =>
@@ -288,26 +294,34 @@ export class InteractionController {
 
   /** Lets the view glide on; the velocity is in views per second. */
   #throwView(initial: Velocity): void {
+    this.stopView();
     if (reducedMotion().matches) return;
     let velocity = initial;
+    // Views are rounded: small steps of them would be lost.
+    let view = this.state.view;
     this.#loop.set('view glide', (seconds) => {
       const next = glide(velocity, seconds);
       velocity = next.velocity;
-      const last = this.state.view;
-      this.state.view = pan(last, next.moved.x, next.moved.y);
+      view = pan(view, next.moved.x, next.moved.y);
+      this.state.view = view;
       this.listener.changed();
-      // The first frame has no duration.
-      const isMoving = seconds === 0 || this.state.view !== last;
-      return isMoving && speedOf(velocity) > MIN_GLIDE_SPEED;
+      const { x, y } = this.state.view;
+      const isAtCorner = Math.abs(x - view.x) > EDGE && Math.abs(y - view.y) > EDGE;
+      return !isAtCorner && speedOf(velocity) > MIN_GLIDE_SPEED;
     });
+  }
+
+  #stopGlide(): void {
+    this.#loop.set('view glide', null);
   }
 
   /** The overview of a magnified picture, for elements with the attribute. */
   #updateMinimap(): void {
     const { options, view, isPictureShown } = this.state;
-    const isShown = options.minimap && isPictureShown && view.zoom > 1;
-    if (!isShown || this.#minimap) {
-      if (this.#minimap?.show(isShown ? view : null)) this.listener.frameNeeded();
+    const isWanted = options.minimap && isPictureShown;
+    const minimap = this.#minimap;
+    if (!isWanted || minimap) {
+      if (minimap?.show(isWanted ? view : null)) this.listener.overviewChanged(minimap.isShown);
       return;
     }
     this.#minimapFetch ??= import('./minimap.js').then(

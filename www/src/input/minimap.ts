@@ -1,9 +1,9 @@
 /**
- * The overview of a magnified picture, with a frame around the part that the view shows. It is a separate script, because
- * few elements have one. Keyboards and screen readers have the keys that pan instead.
+ * The overview of a picture that is seen in part, with a frame around what is seen. It is a separate script, because few
+ * elements have one. Keyboards and screen readers have the keys that pan instead.
  */
 
-import type { ZoomView } from '../state/viewport.js';
+import { toPicture, type ZoomView } from '../state/viewport.js';
 import { adoptStyles } from '../ui/adopted-styles.js';
 import { createElement } from '../ui/dom-helpers.js';
 import type { ShadowDom } from '../ui/shadow-dom.js';
@@ -11,6 +11,8 @@ import MINIMAP_CSS from './minimap.css';
 
 /** The longer side of its picture. */
 const MAX_PIXELS = 320;
+/** A picture of which so much is seen is seen whole. */
+const WHOLE = 0.999;
 
 export class Minimap {
   readonly #canvas = document.createElement('canvas');
@@ -21,45 +23,56 @@ export class Minimap {
     this.#canvas,
     this.#frame,
   );
+  /** It appears with its first picture. */
+  isShown = false;
+  #pointer: number | null = null;
 
   /** `moveTo` gets the point of the picture that a visitor points at. */
-  constructor(dom: ShadowDom, moveTo: (x: number, y: number) => void) {
+  constructor(
+    private readonly dom: ShadowDom,
+    private readonly moveTo: (x: number, y: number) => void,
+  ) {
     adoptStyles(dom.root, MINIMAP_CSS);
     const element = this.#element;
     dom.contentBox.append(element);
-    const move = ({ clientX, clientY }: PointerEvent) => {
-      const { left, top, width, height } = element.getBoundingClientRect();
-      moveTo((clientX - left) / width, (clientY - top) / height);
-    };
     element.addEventListener('pointerdown', (event) => {
-      if (event.button !== 0) return;
+      if (event.button !== 0 || this.#pointer !== null) return;
+      this.#pointer = event.pointerId;
       if (event.isTrusted) element.setPointerCapture(event.pointerId);
-      move(event);
+      this.#point(event);
     });
-    element.addEventListener('pointermove', (event) => {
-      if (event.buttons & 1) move(event);
-    });
+    element.addEventListener('pointermove', (event) => this.#point(event));
+    const release = ({ pointerId }: PointerEvent) => {
+      if (pointerId === this.#pointer) this.#pointer = null;
+    };
+    element.addEventListener('pointerup', release);
+    element.addEventListener('pointercancel', release);
+    // The keyboard's focus stays, and no text is selected.
+    element.addEventListener('mousedown', (event) => event.preventDefault());
   }
 
-  /** Frames what a view shows; `null` hides the overview. Returns whether it has appeared, without a picture yet. */
+  /** Frames what is seen of a view; hides the overview where that is all, and for `null`. Returns whether it has changed. */
   show(view: ZoomView | null): boolean {
-    const wasHidden = this.#element.hidden !== false;
-    this.#element.hidden = view === null;
-    if (!view) return false;
-    const { zoom, x, y } = view;
+    const wasShown = this.isShown;
+    const seen = view && this.#seenPart(view);
+    this.isShown = seen !== null && Math.min(seen.width, seen.height) < WHOLE;
+    if (!seen || !this.isShown) {
+      this.#element.hidden = true;
+      return wasShown;
+    }
     const percent = (share: number) => `${100 * share}%`;
     Object.assign(this.#frame.style, {
-      left: percent(x - 0.5 / zoom),
-      top: percent(y - 0.5 / zoom),
-      width: percent(1 / zoom),
-      height: percent(1 / zoom),
+      left: percent(seen.x),
+      top: percent(seen.y),
+      width: percent(seen.width),
+      height: percent(seen.height),
     });
-    return wasHidden;
+    return !wasShown;
   }
 
   /** Copies a picture, in the task in which it was drawn. */
   draw(picture: HTMLCanvasElement): void {
-    if (this.#element.hidden) return;
+    if (!this.isShown) return;
     const canvas = this.#canvas;
     const factor = Math.min(1, MAX_PIXELS / Math.max(picture.width, picture.height));
     const width = Math.max(1, Math.round(factor * picture.width));
@@ -67,5 +80,23 @@ export class Minimap {
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
     canvas.getContext('2d')?.drawImage(picture, 0, 0, width, height);
+    this.#element.hidden = false;
+  }
+
+  #point({ pointerId, clientX, clientY }: PointerEvent): void {
+    if (pointerId !== this.#pointer) return;
+    const { left, top, width, height } = this.#canvas.getBoundingClientRect();
+    this.moveTo((clientX - left) / width, (clientY - top) / height);
+  }
+
+  /** In fractions of the picture. The element may cut a part of the view off, by `object-fit`. */
+  #seenPart(view: ZoomView) {
+    const box = this.dom.viewport.getBoundingClientRect();
+    const element = this.dom.contentBox.getBoundingClientRect();
+    const corner = (x: number, y: number) =>
+      toPicture(view, { x: (x - box.left) / box.width, y: (y - box.top) / box.height });
+    const { x, y } = corner(Math.max(box.left, element.left), Math.max(box.top, element.top));
+    const end = corner(Math.min(box.right, element.right), Math.min(box.bottom, element.bottom));
+    return { x, y, width: end.x - x, height: end.y - y };
   }
 }

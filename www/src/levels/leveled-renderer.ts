@@ -113,7 +113,8 @@ export class LeveledRenderer implements Renderer {
     }
     const status = barrier.pass((ready) => {
       const id = { level: this.#table.levels - 1, x: 0, y: 0 };
-      const pixels = this.#table.pixelsIn(drawn, id, this.canvas);
+      const rect = part.hasOverview ? this.#table.picture : drawn;
+      const pixels = this.#table.pixelsIn(rect, id, this.canvas);
       return this.root.render(light, output, share, { view: pixels, ready });
     });
     // Not before they are drawn.

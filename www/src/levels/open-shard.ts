@@ -5,8 +5,8 @@ import type { PhotoInfo } from '../shared/value-types.js';
 import type { LevelTable, ShardId } from './level-table.js';
 
 /**
- * Memory for a pixel beside its tiles: the canvas, two copies of its pixels on the way from a worker, and there the window
- * origins and the light.
+ * Memory for a pixel beside its tiles: in the page its canvas and the codes that a worker has sent; in the worker its codes,
+ * its window origin and the light.
  */
 export const BYTES_PER_PIXEL = 20;
 

@@ -18,6 +18,8 @@ export class ShardCache {
   readonly #shards = new Set<CachedShard>();
   /** Those that an element needs. */
   readonly #kept = new Map<unknown, ReadonlySet<CachedShard>>();
+  /** Those that an element shows. */
+  readonly #shown = new Map<unknown, ReadonlySet<CachedShard>>();
   /** Bytes of shards that are being loaded. */
   #reservedBytes = 0;
 
@@ -27,10 +29,10 @@ export class ShardCache {
     this.#shards.add(shard);
   }
 
-  /** Makes room for a shard that is to be loaded. The returned function gives the room back, once. */
+  /** Makes room for a shard that is to be loaded, as far as nobody sees it. Call the returned function after the load. */
   reserve(bytes: number): () => void {
     this.#reservedBytes += bytes;
-    this.#makeRoom();
+    this.#makeRoom(this.#shown, this.#kept);
     return () => {
       this.#reservedBytes -= bytes;
     };
@@ -38,12 +40,14 @@ export class ShardCache {
 
   /** `owner` shows these, and no others. Those of `kept` are not freed. */
   show(owner: unknown, shards: Iterable<CachedShard>, kept: ReadonlySet<CachedShard>): void {
+    const shown = new Set(shards);
     this.#kept.set(owner, kept);
-    for (const shard of shards) {
+    this.#shown.set(owner, shown);
+    for (const shard of shown) {
       this.#shards.delete(shard);
       this.#shards.add(shard);
     }
-    this.#makeRoom();
+    this.#makeRoom(this.#kept);
   }
 
   delete(shard: CachedShard): void {
@@ -53,14 +57,18 @@ export class ShardCache {
   /** `owner` is gone, with its shards. */
   remove(owner: unknown): void {
     this.#kept.delete(owner);
+    this.#shown.delete(owner);
   }
 
-  #makeRoom(): void {
+  /** Frees shards, but none of `spared`. */
+  #makeRoom(...spared: ReadonlyMap<unknown, ReadonlySet<CachedShard>>[]): void {
+    const isSpared = (shard: CachedShard) =>
+      spared.some((byOwner) => [...byOwner.values()].some((shards) => shards.has(shard)));
     let excess = this.#reservedBytes - this.maxBytes;
     for (const { bytes } of this.#shards) excess += bytes;
     for (const shard of [...this.#shards]) {
       if (excess <= 0) return;
-      if ([...this.#kept.values()].some((kept) => kept.has(shard))) continue;
+      if (isSpared(shard)) continue;
       excess -= shard.bytes;
       this.#shards.delete(shard);
       shard.evict();

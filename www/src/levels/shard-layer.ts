@@ -71,8 +71,18 @@ export class ShardLayer {
   view(): PictureView | null {
     const { element, table } = this;
     const picture = element.getBoundingClientRect();
-    const box = element.parentElement?.parentElement?.getBoundingClientRect();
-    if (!box || picture.width === 0 || picture.height === 0) return null;
+    const viewport = element.parentElement?.parentElement?.getBoundingClientRect();
+    const root = element.getRootNode();
+    if (!viewport || !(root instanceof ShadowRoot)) return null;
+    if (picture.width === 0 || picture.height === 0) return null;
+    // The element cuts off what object-fit has beyond it.
+    const host = root.host.getBoundingClientRect();
+    const box = {
+      left: Math.max(viewport.left, host.left),
+      top: Math.max(viewport.top, host.top),
+      right: Math.min(viewport.right, host.right),
+      bottom: Math.min(viewport.bottom, host.bottom),
+    };
     const [across, down] = [table.width / picture.width, table.height / picture.height];
     const pixels = (left: number, top: number, right: number, bottom: number): PixelRect => ({
       left: (left - picture.left) * across,

@@ -45,6 +45,8 @@ export class PhotoSession {
   settings: SessionSettings | null = null;
   /** Whether a frame of the whole photograph was drawn; previews are drawn before. */
   isLoaded = false;
+  /** Whether an overview copies the canvas. */
+  hasOverview = false;
   /** A failed load is permanent: frames, which are of a preview then, do not repair it. */
   #failure: 'temporary' | 'permanent' | null = null;
   /** Aborted when the load and its photograph are released. */
@@ -340,7 +342,10 @@ export class PhotoSession {
     try {
       const startMs = this.ports.now();
       const { renderer } = active;
-      let frame = renderer.render(light, output, quality, { onlyInView: !isFullQuality });
+      let frame = renderer.render(light, output, quality, {
+        onlyInView: !isFullQuality,
+        hasOverview: this.hasOverview,
+      });
       if (!isFullQuality) this.#measure(active, startMs, frame);
       if (frame instanceof Promise) {
         active.frame = new Deferred();

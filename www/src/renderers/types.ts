@@ -21,6 +21,8 @@ export interface BackendPreferences {
 export interface FramePart {
   /** Pixels out of view may keep an older light. */
   readonly onlyInView?: boolean;
+  /** The canvas is whole nevertheless, and only finer parts over it are not. */
+  readonly hasOverview?: boolean;
   /** The pixels in view, whole numbers within the picture; all by default. */
   readonly view?: PixelRect;
   /** A renderer that computes in workers shows the frame once this has settled. */
