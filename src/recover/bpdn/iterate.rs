@@ -14,6 +14,7 @@ const MIN_INITIAL_SLACK_SHARE: f64 = 0.5;
 const MAX_HALVINGS: usize = 60;
 
 /// Unknowns and multipliers, with what follows from them; or their changes.
+#[derive(Clone)]
 pub(super) struct Iterate {
     /// `[k]`.
     pub x: Vec<f64>,
@@ -145,18 +146,19 @@ impl Iterate {
         sum + (self.lambda + dual * step.lambda) * slack
     }
 
-    /// Goes along a step, nearly as far as the constraints allow.
+    /// Goes along a step, `share` of nearly as far as the constraints allow.
     #[cfg_attr(target_arch = "x86_64", inline(always))]
     pub fn take_step(
         &mut self,
         operator: &SensingOperator,
         constraint: &BpdnConstraint,
         step: &NewtonStep,
+        share: f64,
     ) {
         let (primal, dual) = self.max_step_lengths(step);
         let shorten = |length: f64| match length < 1.0 {
-            true => STEP_SHARE * length,
-            false => 1.0,
+            true => share * STEP_SHARE * length,
+            false => share,
         };
         let (primal, dual) = (shorten(primal), shorten(dual));
         add_scaled(&mut self.x, primal, &step.x);
