@@ -3,6 +3,8 @@
 use std::io;
 
 use anyhow::Error as AnyError;
+use image::ImageError;
+use png::EncodingError;
 
 use super::check::NotReadyError;
 use super::ltm_file::LtmFileError;
@@ -72,6 +74,12 @@ fn io_error(cause: Cause<'_>) -> Option<&io::Error> {
         };
     }
     if let Some(LtmFileError::Open(error)) = cause.downcast_ref() {
+        return Some(error);
+    }
+    if let Some(ImageError::IoError(error)) = cause.downcast_ref() {
+        return Some(error);
+    }
+    if let Some(EncodingError::IoError(error)) = cause.downcast_ref() {
         return Some(error);
     }
     match (cause.downcast_ref(), cause.downcast_ref()) {
@@ -186,6 +194,8 @@ mod tests {
             (FormatError::Memory(9).into(), TEMPORARY),
             (CheckpointInUseError.into(), TEMPORARY),
             (full().into(), TEMPORARY),
+            (ImageError::IoError(full()).into(), TEMPORARY),
+            (EncodingError::IoError(full()).into(), TEMPORARY),
             (io::Error::from_raw_os_error(5).into(), TEMPORARY),
             (missing().into(), FAILURE),
             (InputError(RecoverError::NoSignal.into()).into(), DATA_ERROR),

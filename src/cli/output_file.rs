@@ -79,14 +79,6 @@ impl FileSignature {
     }
 }
 
-/// An error without the temporary name.
-fn without_name(error: io::Error) -> io::Error {
-    match error.raw_os_error() {
-        Some(code) => io::Error::from_raw_os_error(code),
-        None => error.kind().into(),
-    }
-}
-
 /// An error in reading an input while an output is written. It names the input.
 #[derive(Debug, thiserror::Error)]
 #[error("{0:#}")]
@@ -131,7 +123,7 @@ impl OutputFile {
             let (builder, folder) = temporary_beside(path, 0o666);
             builder
                 .tempfile_in(folder)
-                .map_err(without_name)
+                .map_err(|e| io::Error::from(e.kind())) // without the temporary name
                 .context("cannot be created; does its folder exist, and may you write there?")
         };
         let file = create().with_context(|| path.display().to_string())?;

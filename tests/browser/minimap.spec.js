@@ -95,11 +95,19 @@ test.describe('the overview', () => {
     await page.evaluate(
       "Object.assign(photo.style, { width: '600px', height: '600px', objectFit: 'cover' })",
     );
-    await page.evaluate('photo.lightSize = 0.3');
+    await page.evaluate('photo.view = { zoom: 2 }');
     await waitUntil(page, IS_SHOWN);
     const { map, frame } = await boxesOf(page);
-    // 41 of 523 columns are seen.
-    expect(frame.width / map.width).toBeCloseTo(41 / 523, 2);
+    // A half of 41 of 523 columns are seen.
+    expect(frame.width / map.width).toBeCloseTo(41 / 523 / 2, 2);
+    await page.mouse.click(map.x + 0.4 * map.width, map.y + map.height / 2);
+    const moved = (await boxesOf(page)).frame;
+    expect((moved.x + moved.width / 2 - map.x) / map.width).toBeCloseTo(0.4, 1);
+    await page.evaluate("photo.style.height = '300px'");
+    await waitUntil(
+      page,
+      `${MINIMAP}.querySelector('.minimap-frame').offsetWidth > 1.5 * ${frame.width}`,
+    );
     expect(map.width / map.height, 'the overview keeps its shape').toBeGreaterThan(8);
   });
 
@@ -130,10 +138,10 @@ test.describe('the overview', () => {
     const page = await openPage('/plain');
     await page.route('**/relightable-photo-minimap.js', (route) => route.abort());
     await mount(page, { backend: 'cpu' });
+    await page.evaluate('photo.view = { zoom: 2 }');
     const events = await waitForEvents(page, 'warning');
     const warning = events.find(({ type }) => type === 'warning');
     expect(warning?.['code']).toBe('minimap-unavailable');
-    await page.evaluate('photo.view = { zoom: 2 }');
     expect(await page.evaluate('photo.view.zoom')).toBe(2);
   });
 });

@@ -120,9 +120,7 @@ impl<'a, F: CaptureFiles> CapturePng<'a, F> {
     fn unreadable(&self, error: DecodingError) -> CaptureError {
         self.error(match error {
             // The disk or the network is at fault, not the file.
-            DecodingError::IoError(e) if e.kind() != ErrorKind::UnexpectedEof => {
-                CaptureErrorKind::Io(e)
-            }
+            DecodingError::IoError(e) if e.raw_os_error().is_some() => CaptureErrorKind::Io(e),
             error => {
                 let reason = error.to_string().trim_end_matches('.').to_owned();
                 CaptureErrorKind::Unreadable(reason)

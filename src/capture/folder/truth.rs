@@ -146,5 +146,8 @@ fn read_npy<T: npyz::Deserialize, S>(
         let shape = check(npy.shape()).map_err(io::Error::other)?;
         Ok((shape, npy.into_vec()?))
     };
-    read().map_err(|e| truth_error(path, e.to_string()))
+    read().map_err(|e| match e.raw_os_error() {
+        Some(_) => CaptureError::new(path, CaptureErrorKind::Io(e)),
+        None => truth_error(path, e.to_string()),
+    })
 }

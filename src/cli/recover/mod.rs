@@ -60,6 +60,9 @@ pub fn recover(
     let shots = select_shots(&manifest.shots, args.patterns.map(|k| k as usize))
         .map_err(messages::too_few_shots)?;
     if shots.len() < MIN_PATTERNS {
+        if let Some(patterns) = args.patterns {
+            bail!("--patterns is {patterns}, but recovery needs at least {MIN_PATTERNS}");
+        }
         let manifest = folder.manifest_path().display().to_string();
         return Err(RecoverError::TooFewPatterns(shots.len())).context(manifest);
     }

@@ -324,6 +324,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
       loadStarted: () => {
         this.status.set('loading');
         this.#clearPicture();
+        this.schedule();
         this.#dom.updateProgress(Number.NaN);
       },
       progress: (loaded, total) => {
@@ -412,7 +413,12 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
       this.schedule();
     };
     observeVisibility(this.host, update, signal);
-    observeStyle(this.host, () => this.#dom.updateFit(), signal);
+    const follow = () => {
+      this.#dom.updateFit();
+      this.session.redraw();
+      this.schedule();
+    };
+    observeStyle(this.host, follow, signal);
   }
 
   /** Gives the session new settings, as soon as the photograph may be fetched. */

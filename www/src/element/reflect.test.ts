@@ -47,6 +47,7 @@ test('properties have defaults', () => {
     controls: false,
     zoom: 1,
     cooperativeGestures: false,
+    minimap: false,
     autoplayLight: false,
     kiosk: 0,
     crossOrigin: null,

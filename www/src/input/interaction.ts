@@ -318,7 +318,7 @@ export class InteractionController {
   /** The overview of a magnified picture, for elements with the attribute. */
   #updateMinimap(): void {
     const { options, view, isPictureShown } = this.state;
-    const isWanted = options.minimap && isPictureShown;
+    const isWanted = options.minimap && isPictureShown && view.zoom > 1;
     const minimap = this.#minimap;
     if (!isWanted || minimap) {
       if (minimap?.show(isWanted ? view : null)) this.listener.overviewChanged(minimap.isShown);

@@ -1,5 +1,5 @@
 /**
- * The overview of a picture that is seen in part, with a frame around what is seen. It is a separate script, because few
+ * The overview of a magnified picture, with a frame around what is seen. It is a separate script, because few
  * elements have one. Keyboards and screen readers have the keys that pan instead.
  */
 
@@ -11,9 +11,6 @@ import MINIMAP_CSS from './minimap.css';
 
 /** The longer side of its picture. */
 const MAX_PIXELS = 320;
-/** A picture of which so much is seen is seen whole. */
-const WHOLE = 0.999;
-
 export class Minimap {
   readonly #canvas = document.createElement('canvas');
   readonly #frame = createElement('div', { class: 'minimap-frame' });
@@ -25,6 +22,7 @@ export class Minimap {
   );
   /** It appears with its first picture. */
   isShown = false;
+  #view: ZoomView | null = null;
   #pointer: number | null = null;
 
   /** `moveTo` gets the point of the picture that a visitor points at. */
@@ -36,30 +34,34 @@ export class Minimap {
     const element = this.#element;
     dom.contentBox.append(element);
     element.addEventListener('pointerdown', (event) => {
-      if (event.button !== 0 || this.#pointer !== null) return;
+      if (event.button !== 0 || !event.isPrimary) return;
       this.#pointer = event.pointerId;
       if (event.isTrusted) element.setPointerCapture(event.pointerId);
       this.#point(event);
     });
-    element.addEventListener('pointermove', (event) => this.#point(event));
+    element.addEventListener('pointermove', (event) => {
+      if (event.buttons & 1) this.#point(event);
+    });
     const release = ({ pointerId }: PointerEvent) => {
       if (pointerId === this.#pointer) this.#pointer = null;
     };
     element.addEventListener('pointerup', release);
     element.addEventListener('pointercancel', release);
+    element.addEventListener('lostpointercapture', release);
     // The keyboard's focus stays, and no text is selected.
     element.addEventListener('mousedown', (event) => event.preventDefault());
   }
 
-  /** Frames what is seen of a view; hides the overview where that is all, and for `null`. Returns whether it has changed. */
+  /** Frames what is seen of a view; `null` hides the overview. Returns whether it has appeared or disappeared. */
   show(view: ZoomView | null): boolean {
     const wasShown = this.isShown;
-    const seen = view && this.#seenPart(view);
-    this.isShown = seen !== null && Math.min(seen.width, seen.height) < WHOLE;
-    if (!seen || !this.isShown) {
+    this.#view = view;
+    this.isShown = view !== null;
+    if (!view) {
       this.#element.hidden = true;
       return wasShown;
     }
+    const seen = this.#seenPart(view);
     const percent = (share: number) => `${100 * share}%`;
     Object.assign(this.#frame.style, {
       left: percent(seen.x),
@@ -84,9 +86,14 @@ export class Minimap {
   }
 
   #point({ pointerId, clientX, clientY }: PointerEvent): void {
-    if (pointerId !== this.#pointer) return;
+    const view = this.#view;
+    if (pointerId !== this.#pointer || !view) return;
     const { left, top, width, height } = this.#canvas.getBoundingClientRect();
-    this.moveTo((clientX - left) / width, (clientY - top) / height);
+    // The middle of what is seen goes there; it is not that of the view where object-fit cuts it.
+    const seen = this.#seenPart(view);
+    const x = view.x - (seen.x + seen.width / 2) + (clientX - left) / width;
+    const y = view.y - (seen.y + seen.height / 2) + (clientY - top) / height;
+    this.moveTo(x, y);
   }
 
   /** In fractions of the picture. The element may cut a part of the view off, by `object-fit`. */

@@ -34,13 +34,17 @@ test('a shard that is to be loaded has room made for it', () => {
   assert.deepEqual(evicted, ['b']);
   cache.reserve(40);
   assert.deepEqual(evicted, ['b']);
+  cache.show('element', [a], new Set());
+  assert.deepEqual(evicted, ['b'], 'and while the other is loaded');
   cache.show('element', [], new Set());
+  const again = cache.reserve(0);
   assert.deepEqual(evicted, ['b', 'a']);
   add('c');
+  again();
   release();
-  cache.show('element', [], new Set());
+  cache.reserve(20);
   assert.deepEqual(evicted, ['b', 'a'], 'the room is free again');
-  cache.reserve(40);
+  cache.reserve(1);
   assert.deepEqual(evicted, ['b', 'a', 'c']);
 });
 

@@ -32,7 +32,7 @@ export class ShardCache {
   /** Makes room for a shard that is to be loaded, as far as nobody sees it. Call the returned function after the load. */
   reserve(bytes: number): () => void {
     this.#reservedBytes += bytes;
-    this.#makeRoom(this.#shown, this.#kept);
+    this.#makeRoom(this.#reservedBytes, this.#shown, this.#kept);
     return () => {
       this.#reservedBytes -= bytes;
     };
@@ -47,7 +47,7 @@ export class ShardCache {
       this.#shards.delete(shard);
       this.#shards.add(shard);
     }
-    this.#makeRoom(this.#kept);
+    this.#makeRoom(0, this.#kept);
   }
 
   delete(shard: CachedShard): void {
@@ -60,12 +60,12 @@ export class ShardCache {
     this.#shown.delete(owner);
   }
 
-  /** Frees shards, but none of `spared`. */
-  #makeRoom(...spared: ReadonlyMap<unknown, ReadonlySet<CachedShard>>[]): void {
+  /** Frees shards until `bytes` more fit, but none of `spared`. */
+  #makeRoom(bytes: number, ...spared: ReadonlyMap<unknown, ReadonlySet<CachedShard>>[]): void {
     const isSpared = (shard: CachedShard) =>
       spared.some((byOwner) => [...byOwner.values()].some((shards) => shards.has(shard)));
-    let excess = this.#reservedBytes - this.maxBytes;
-    for (const { bytes } of this.#shards) excess += bytes;
+    let excess = bytes - this.maxBytes;
+    for (const shard of this.#shards) excess += shard.bytes;
     for (const shard of [...this.#shards]) {
       if (excess <= 0) return;
       if (isSpared(shard)) continue;
