@@ -36,7 +36,7 @@ pub fn exit_status(error: &AnyError) -> u8 {
     } else if is_any(|cause| cause.is::<UsageError>()) {
         USAGE
     } else if is_any(is_temporary) {
-        // Before the files, which such errors are reported of.
+        // Before errors of files: a failure of the disk may be reported as one.
         TEMPORARY
     } else if is_any(is_of_data) {
         DATA_ERROR
@@ -156,7 +156,7 @@ fn is_of_photographs(error: &RecoverError) -> bool {
     )
 }
 
-/// Whether a file that was read is at fault, and not one that is written.
+/// Whether a file that was read is at fault. Files that are written have other errors.
 fn is_of_file(error: &FormatError) -> bool {
     use FormatError::{Compress, Source, Spool, TooLarge, Write};
     !matches!(
@@ -209,7 +209,7 @@ mod tests {
         ];
         for (error, status) in cases {
             assert_eq!(exit_status(&error), status, "{error:?}");
-            // What was done at the time changes nothing.
+            // A context does not change it.
             let told = format!("{error:?}");
             let named = Err::<(), _>(error).context("photo.ltm").unwrap_err();
             assert_eq!(exit_status(&named), status, "{told}");

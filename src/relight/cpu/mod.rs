@@ -4,7 +4,7 @@
 //! block has changed, the block's basis response is computed ([`correlation`]) and combined with the pixels'
 //! coefficients while it is in the cache ([`combine`]); the functions of direct tiles are summed slot by slot
 //! ([`windowed_sum`]). Other blocks keep their pixels, and so do blocks out of view. Blocks are independent, so threads share
-//! them. What is kept of a pixel is its linear light, or its code, a third of the memory ([`StoredPixel`]).
+//! them. A relighter keeps linear light, or the codes of a canvas, which take a third of the memory ([`StoredPixel`]).
 //!
 //! A basis response is exact to about a millionth of the block's brightest element.
 
@@ -76,14 +76,7 @@ pub struct CpuRelighter<P: StoredPixel> {
     /// The pixels in view.
     view: TileRect,
     /// Memory of threads that are idle, kept from frame to frame.
-    scratch_pool: Mutex<Vec<BlockScratch>>,
-}
-
-/// Memory to relight a block in.
-#[derive(Debug, Default)]
-struct BlockScratch {
-    correlation: Option<CorrelationScratch>,
-    linear: Vec<LinearPixel>,
+    scratch_pool: Mutex<Vec<CorrelationScratch>>,
 }
 
 impl<P: StoredPixel> CpuRelighter<P> {
@@ -165,7 +158,8 @@ impl<P: StoredPixel> CpuRelighter<P> {
     /// If the light's extent is not the transport's.
     pub fn relight(&mut self, light: &Light, executor: &impl Executor) {
         let extent = self.transport.geometry.light;
-        assert_eq!(light.extent(), extent, "extent of the light");
+        // Not `assert_eq`, whose formatting code modules would have to carry.
+        assert!(light.extent() == extent, "extent of the light");
         let width = extent.width as usize;
         for v in self.light_rows() {
             self.set_light_row(v, &light.elements()[v as usize * width..][..width]);
@@ -202,13 +196,13 @@ impl<P: StoredPixel> CpuRelighter<P> {
         }
         let this = &*self;
         executor.map(stale.len(), |i| {
-            let mut scratch = lock(&this.scratch_pool).pop().unwrap_or_default();
+            let mut scratch = lock(&this.scratch_pool).pop();
             SimdLevel::widest().run(BlockRelightKernel {
                 relighter: this,
                 block: stale[i],
                 scratch: &mut scratch,
             });
-            lock(&this.scratch_pool).push(scratch);
+            lock(&this.scratch_pool).extend(scratch);
         });
         self.light.clear_changes();
     }
@@ -219,15 +213,21 @@ impl<P: StoredPixel> CpuRelighter<P> {
     }
 
     #[inline(always)]
-    fn relight_block<S: Simd>(&self, simd: S, index: usize, scratch: &mut BlockScratch) {
+    fn relight_block<S: Simd>(
+        &self,
+        simd: S,
+        index: usize,
+        scratch: &mut Option<CorrelationScratch>,
+    ) {
         let block = &self.blocks.blocks[index];
         let mut pixels = self.pixels[index]
             .write()
             .unwrap_or_else(PoisonError::into_inner);
-        let linear = P::linear(&mut pixels, &mut scratch.linear);
-        self.compute(simd, block, &mut scratch.correlation, linear);
+        let mut computed = Vec::new();
+        let linear = P::linear(&mut pixels, &mut computed);
+        self.compute(simd, block, scratch, linear);
         let spans = block.spans.iter().map(|span| (span.pixel, span.range()));
-        P::store(&self.encoder, &scratch.linear, spans, &mut pixels);
+        P::store(&self.encoder, &computed, spans, &mut pixels);
     }
 
     /// Relights a block.
@@ -386,7 +386,6 @@ impl EncodedRelighter {
     /// If `out` is not as large as the rows.
     pub fn copy_rows(&self, rows: Range<u32>, out: &mut [EncodedPixel]) {
         let width = self.transport.geometry.camera.width as usize;
-        // Not `assert_eq`, whose formatting code modules would have to carry.
         assert!(out.len() == rows.len() * width, "pixels of the rows");
         out.fill(EncodedPixel::DARK);
         let first = rows.start;
@@ -400,7 +399,7 @@ impl EncodedRelighter {
 struct BlockRelightKernel<'a, P: StoredPixel> {
     relighter: &'a CpuRelighter<P>,
     block: usize,
-    scratch: &'a mut BlockScratch,
+    scratch: &'a mut Option<CorrelationScratch>,
 }
 
 impl<P: StoredPixel> SimdKernel for BlockRelightKernel<'_, P> {

@@ -1,4 +1,4 @@
-//! What a relighter keeps of each pixel: its linear light, for figures, or its code, for canvases.
+//! The pixels that a relighter keeps: linear light, for figures, or codes, for canvases.
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -20,7 +20,7 @@ pub trait StoredPixel: Copy + Debug + Send + Sync {
     /// A pixel without light.
     const DARK: Self;
 
-    /// Where to compute the linear pixels of `stored`: in place, or in `scratch`, which is given their length then.
+    /// Where to compute the linear pixels of `stored`: in place, or in `scratch`.
     fn linear<'a>(
         stored: &'a mut [Self],
         scratch: &'a mut Vec<LinearPixel>,
@@ -82,7 +82,7 @@ impl StoredPixel for EncodedPixel {
         stored: &'a mut [Self],
         scratch: &'a mut Vec<LinearPixel>,
     ) -> &'a mut [LinearPixel] {
-        scratch.resize(stored.len(), LinearPixel::DARK);
+        *scratch = vec![LinearPixel::DARK; stored.len()];
         scratch
     }
 

@@ -1,5 +1,5 @@
 /**
- * The overview of a magnified picture, with a frame around what is seen. It is a separate script, because few
+ * The overview of a magnified picture, with a frame around the visible part. It is a separate script, because few
  * elements have one. Keyboards and screen readers have the keys that pan instead.
  */
 
@@ -52,7 +52,7 @@ export class Minimap {
     element.addEventListener('mousedown', (event) => event.preventDefault());
   }
 
-  /** Frames what is seen of a view; `null` hides the overview. Returns whether it has appeared or disappeared. */
+  /** Frames the visible part of a view; `null` hides the overview. Returns whether it has appeared or disappeared. */
   show(view: ZoomView | null): boolean {
     const wasShown = this.isShown;
     this.#view = view;
@@ -61,13 +61,13 @@ export class Minimap {
       this.#element.hidden = true;
       return wasShown;
     }
-    const seen = this.#seenPart(view);
+    const visible = this.#visiblePart(view);
     const percent = (share: number) => `${100 * share}%`;
     Object.assign(this.#frame.style, {
-      left: percent(seen.x),
-      top: percent(seen.y),
-      width: percent(seen.width),
-      height: percent(seen.height),
+      left: percent(visible.x),
+      top: percent(visible.y),
+      width: percent(visible.width),
+      height: percent(visible.height),
     });
     return !wasShown;
   }
@@ -89,15 +89,15 @@ export class Minimap {
     const view = this.#view;
     if (pointerId !== this.#pointer || !view) return;
     const { left, top, width, height } = this.#canvas.getBoundingClientRect();
-    // The middle of what is seen goes there; it is not that of the view where object-fit cuts it.
-    const seen = this.#seenPart(view);
-    const x = view.x - (seen.x + seen.width / 2) + (clientX - left) / width;
-    const y = view.y - (seen.y + seen.height / 2) + (clientY - top) / height;
+    // The centre of the visible part goes there: where object-fit crops, it is not that of the view.
+    const visible = this.#visiblePart(view);
+    const x = view.x - (visible.x + visible.width / 2) + (clientX - left) / width;
+    const y = view.y - (visible.y + visible.height / 2) + (clientY - top) / height;
     this.moveTo(x, y);
   }
 
   /** In fractions of the picture. The element may cut a part of the view off, by `object-fit`. */
-  #seenPart(view: ZoomView) {
+  #visiblePart(view: ZoomView) {
     const box = this.dom.viewport.getBoundingClientRect();
     const element = this.dom.contentBox.getBoundingClientRect();
     const corner = (x: number, y: number) =>
