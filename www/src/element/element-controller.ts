@@ -217,7 +217,7 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
 
   /** The current view with other values. @throws {TypeError} for an invalid field */
   #completeView(wanted: ViewChange | PictureRect): ZoomView {
-    checkFields(wanted, 'view', ['zoom', 'scale', 'x', 'y', 'width', 'height']);
+    checkFields(wanted, 'view', ['zoom', 'x', 'y', 'width', 'height', 'scale']);
     const view: ViewChange = 'width' in wanted ? viewOf(wanted) : wanted;
     const { maxZoom } = this.readOptions();
     const last = this.state.view;
