@@ -322,7 +322,7 @@ test('the manifest lists every attribute, event, member, property and part', asy
   assert.deepEqual(names(ofClass ?? []), statics.filter((name) => !builtIn.includes(name)).sort());
   const read = (/** @type {string} */ part) =>
     readFileSync(join(place, `dist/relightable-photo${part}.js`), 'utf8');
-  const script = ['', '-controls', '-input'].map(read).join();
+  const script = ['', '-controls', '-input', '-minimap'].map(read).join();
   const properties = new Set(script.match(/--relightable-photo-[a-z-]+/g));
   assert.deepEqual(names(element.cssProperties), [...properties].sort());
   const parts = [...script.matchAll(/\bpart["'`]?[:=,]\s*["'`]([a-z- ]+)/g)].flatMap(([, part]) =>
