@@ -415,7 +415,6 @@ export class ElementController<Host extends HTMLElement = HTMLElement> {
     observeVisibility(this.host, update, signal);
     const follow = () => {
       this.#dom.updateFit();
-      this.session.redraw();
       this.schedule();
     };
     observeStyle(this.host, follow, signal);

@@ -28,7 +28,7 @@ test('a shard that is to be loaded has room made for it', () => {
   const { cache, add, evicted } = createCache();
   const a = add('a');
   add('b');
-  // One that is shown stays, needed or not.
+  // A shard that is shown stays, whether or not it is needed.
   cache.show('element', [a], new Set());
   const release = cache.reserve(40);
   assert.deepEqual(evicted, ['b']);
