@@ -26,7 +26,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use rayon::prelude::*;
-use relightable_photo::capture::{CameraRowSet, LinearPhoto, Measurements, NoiseModel, Pattern};
+use relightable_photo::capture::{CameraPixelSet, LinearPhoto, Measurements, NoiseModel, Pattern};
 use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::recover::{
     Homotopy, Method, Nnls, PreparedRecovery, RecoverySettings, SparsityBasis,
@@ -118,7 +118,7 @@ fn photograph(camera: Extent) -> (Measurements, Vec<TileTransportFunctions>) {
         correspondence: geometry.correspondence,
         patterns: patterns.collect(),
         full_scale: vec![1.0; PATTERNS],
-        rows: CameraRowSet::all(camera.height),
+        loaded: CameraPixelSet::all(camera),
         photos: pictures,
         flood: None,
         noise: NoiseModel::from_dark(&dark, camera.width, code),

@@ -1,4 +1,4 @@
-//! A set of camera rows: the rows of the photographs that are loaded.
+//! A set of camera rows.
 
 use std::ops::Range;
 

@@ -2,13 +2,17 @@
 //!
 //! A pixel is hot if it is saturated in nearly all photographs, and neither of its neighbours in the row is. It is dead if it
 //! has one code in all photographs, and both of its neighbours receive light: lead between panes of glass receives none
-//! either, but its codes vary by the read noise. Only rows are compared, so that a row is filled alike whatever other rows
-//! are loaded.
+//! either, but its codes vary by the read noise. Only neighbours in the row are compared, so that a pixel is filled alike
+//! whatever pixels are loaded beside it and [`MARGIN`] pixels on either side.
 
-use std::ops::AddAssign;
+use std::ops::{AddAssign, Range};
 
 use super::measurements::Measurements;
 use crate::transport::CHANNELS;
+
+/// Distance in the row, in camera pixels, of the measurements that a filled pixel depends on: a dead pixel is filled from its
+/// neighbours, which are filled from theirs if they are hot.
+pub(crate) const MARGIN: u32 = 2;
 
 /// Share of the photographs that saturate a hot pixel, at least, and its neighbours, at most.
 const MIN_HOT_SHARE: f64 = 0.9;
@@ -38,18 +42,26 @@ impl AddAssign for DefectivePixels {
 }
 
 impl Measurements {
+    /// Fills the hot pixels and then the dead ones of the loaded rows from row `first_row` on; codes are `quantum` apart.
+    /// Pixels without a loaded neighbour stay as they are. Returns the numbers of filled pixels.
+    pub fn fill_defective_pixels(&mut self, first_row: u32, quantum: f64) -> DefectivePixels {
+        DefectivePixels {
+            hot: self.fill_hot_pixels(first_row),
+            dead: self.fill_dead_pixels(first_row, quantum),
+        }
+    }
+
     /// Replaces the samples of hot pixels by the means of their neighbours in the row. Returns their number.
-    pub fn fill_hot_pixels(&mut self) -> usize {
-        let is_hot = |row: &PixelRow<f64>, x: usize, neighbours: [usize; 2]| {
+    fn fill_hot_pixels(&mut self, first_row: u32) -> usize {
+        let is_hot = |row: &PixelSpan<f64>, x: usize, neighbours: [usize; 2]| {
             let [a, b] = neighbours.map(|x| row.values[x]);
             row.values[x] >= MIN_HOT_SHARE && a.max(b) <= MAX_NEIGHBOUR_SHARE
         };
-        self.fill_pixels(Self::saturated_share, is_hot)
+        self.fill_pixels(first_row, Self::saturated_share, is_hot)
     }
 
-    /// Replaces the samples of dead pixels by the means of their neighbours in the row; codes are `quantum` apart. Returns
-    /// their number.
-    pub fn fill_dead_pixels(&mut self, quantum: f64) -> usize {
+    /// Replaces the samples of dead pixels by the means of their neighbours in the row. Returns their number.
+    fn fill_dead_pixels(&mut self, first_row: u32, quantum: f64) -> usize {
         let read_noise = self.noise.floor.map(f64::sqrt);
         if read_noise
             .iter()
@@ -57,7 +69,7 @@ impl Measurements {
         {
             return 0;
         }
-        let is_dead = |row: &PixelRow<bool>, x: usize, neighbours: [usize; 2]| {
+        let is_dead = |row: &PixelSpan<bool>, x: usize, neighbours: [usize; 2]| {
             let is_lit = |n: usize| {
                 (0..CHANNELS)
                     .any(|c| row.measurements.mean(n, c) > MIN_NEIGHBOUR_LIGHT * read_noise[c])
@@ -69,43 +81,57 @@ impl Measurements {
         let first = full_scales.map(|own| self.full_scale.iter().position(|other| other == own));
         let first: Vec<usize> = first.flatten().collect();
         self.fill_pixels(
+            first_row,
             |measurements, n| measurements.has_one_code(n, &first),
             is_dead,
         )
     }
 
-    /// Fills the pixels of which `is_defective` holds, given their row with a value of each pixel, their column and those
-    /// of their neighbours. Returns their number.
+    /// Fills the pixels of which `is_defective` holds, given their span with a value of each pixel, their place in it and
+    /// those of their neighbours. Returns their number.
     fn fill_pixels<V>(
         &mut self,
+        first_row: u32,
         value: impl Fn(&Self, usize) -> V,
-        is_defective: impl Fn(&PixelRow<'_, V>, usize, [usize; 2]) -> bool,
+        is_defective: impl Fn(&PixelSpan<'_, V>, usize, [usize; 2]) -> bool,
     ) -> usize {
-        let width = self.camera.width as usize;
+        let width = self.camera.width;
         if width < 2 {
             return 0;
         }
-        // At the border there is one neighbour.
-        let neighbours = |x: usize| match x {
-            0 => [1, 1],
-            x if x + 1 == width => [x - 1, x - 1],
-            x => [x - 1, x + 1],
-        };
         let mut filled = 0;
-        for start in (0..self.rows.count()).map(|row| row * width) {
-            let row = PixelRow {
+        let mut start = self.loaded.count_above(first_row);
+        let rows = self.loaded.rows().iter().skip_while(|y| *y < first_row);
+        let spans: Vec<Range<u32>> = rows.flat_map(|y| self.loaded.spans_of(y)).collect();
+        for columns in spans {
+            let count = columns.len();
+            // At the border of the picture there is one neighbour.
+            let neighbours = |x: usize| match x {
+                0 if columns.start == 0 => (count > 1).then_some([1, 1]),
+                x if x + 1 == count && columns.end == width => Some([x.checked_sub(1)?; 2]),
+                x => (x + 1 < count).then_some([x.checked_sub(1)?, x + 1]),
+            };
+            let span = PixelSpan {
                 measurements: self,
                 start,
-                values: (start..start + width).map(|n| value(self, n)).collect(),
+                values: (start..start + count).map(|n| value(self, n)).collect(),
             };
-            let defective = (0..width).filter(|&x| is_defective(&row, x, neighbours(x)));
-            for x in defective.collect::<Vec<_>>() {
-                let [a, b] = neighbours(x).map(|x| start + x);
-                for photo in &mut self.photos {
-                    photo[start + x] = std::array::from_fn(|c| 0.5 * (photo[a][c] + photo[b][c]));
-                }
-                filled += 1;
+            let defective = (0..count).filter_map(|x| {
+                let neighbours = neighbours(x)?;
+                is_defective(&span, x, neighbours).then_some((x, neighbours))
+            });
+            let defective: Vec<(usize, [usize; 2])> = defective.collect();
+            for photo in &mut self.photos {
+                // Not from neighbours that are filled now.
+                let mean = |&(x, [a, b]): &(usize, [usize; 2])| {
+                    let [a, b] = [a, b].map(|x| photo[start + x]);
+                    (x, std::array::from_fn(|c| 0.5 * (a[c] + b[c])))
+                };
+                let means: Vec<(usize, [f32; CHANNELS])> = defective.iter().map(mean).collect();
+                (means.into_iter()).for_each(|(x, mean)| photo[start + x] = mean);
             }
+            filled += defective.len();
+            start += count;
         }
         filled
     }
@@ -135,8 +161,8 @@ impl Measurements {
     }
 }
 
-/// A row of pixels, with a value of each.
-struct PixelRow<'a, V> {
+/// Loaded pixels that are adjacent in a row, with a value of each.
+struct PixelSpan<'a, V> {
     measurements: &'a Measurements,
     /// Index of its first pixel.
     start: usize,
@@ -151,14 +177,14 @@ mod tests {
     fn hot_pixels_are_filled_and_no_others() {
         let mut measurements = SyntheticCapture::smooth(12).measurements;
         let clean = measurements.photos.clone();
-        assert_eq!(measurements.fill_hot_pixels(), 0);
+        assert_eq!(measurements.fill_hot_pixels(0), 0);
         assert_eq!(measurements.photos, clean);
         let (hot, corner) = (5 * 32 + 7, 31 * 32 + 31);
         for photo in &mut measurements.photos {
             photo[hot] = [f32::NAN; 3];
             photo[corner] = [f32::NAN; 3];
         }
-        assert_eq!(measurements.fill_hot_pixels(), 2);
+        assert_eq!(measurements.fill_hot_pixels(0), 2);
         for (photo, clean) in measurements.photos.iter().zip(&clean) {
             for n in 0..clean.len() {
                 let expected = match n {
@@ -173,7 +199,7 @@ mod tests {
         for photo in &mut measurements.photos {
             photo[40..50].fill([f32::NAN; 3]);
         }
-        assert_eq!(measurements.fill_hot_pixels(), 0);
+        assert_eq!(measurements.fill_hot_pixels(0), 0);
     }
 
     #[test]
@@ -186,16 +212,16 @@ mod tests {
             measurements.full_scale[l] = 2.0;
         }
         let clean = measurements.photos.clone();
-        assert_eq!(measurements.fill_dead_pixels(QUANTUM), 0);
+        assert_eq!(measurements.fill_dead_pixels(0, QUANTUM), 0);
         let (dead, dark) = (5 * 32 + 7, 9 * 32 + 7);
         for (l, photo) in measurements.photos.iter_mut().enumerate() {
             photo[dead] = [if [3, 7].contains(&l) { -0.0005 } else { -0.001 }; 3];
             // Without light, samples vary.
             photo[dark] = [1e-5 * (l % 2) as f32; 3];
         }
-        let coarse = measurements.clone().fill_dead_pixels(3.0 * QUANTUM);
+        let coarse = measurements.clone().fill_dead_pixels(0, 3.0 * QUANTUM);
         assert_eq!(coarse, 0);
-        assert_eq!(measurements.fill_dead_pixels(QUANTUM), 1);
+        assert_eq!(measurements.fill_dead_pixels(0, QUANTUM), 1);
         for (photo, clean) in measurements.photos.iter().zip(&clean) {
             let expected = 0.5 * (clean[dead - 1][1] + clean[dead + 1][1]);
             assert!((photo[dead][1] - expected).abs() < 1e-6);
@@ -206,6 +232,6 @@ mod tests {
             photo[dead - 1] = [0.0; 3];
             photo[dead] = [0.0; 3];
         }
-        assert_eq!(measurements.fill_dead_pixels(QUANTUM), 0);
+        assert_eq!(measurements.fill_dead_pixels(0, QUANTUM), 0);
     }
 }

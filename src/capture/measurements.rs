@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::camera_row_set::CameraRowSet;
+use super::camera_pixel_set::CameraPixelSet;
 use super::noise_model::NoiseModel;
 use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent, TileRect};
 
@@ -45,15 +45,14 @@ impl Pattern {
     }
 }
 
-/// Camera rows of a photograph as measurements, `[rows, width]`; NaN where saturated.
+/// Camera pixels of a photograph as measurements, row by row; NaN where saturated.
 pub type LinearPhoto = Vec<[f32; CHANNELS]>;
 
-/// Patterns and the loaded rows of their photographs, in linear units.
+/// Patterns and the loaded pixels of their photographs, in linear units.
 ///
-/// Large photographs need not be in memory whole: `rows` lists the loaded camera rows. While a recovery is prepared
-/// these may be strips spread over the picture, of which only tiles that are loaded whole
-/// ([`has_tile`](Self::has_tile)) may be used. While a tile is recovered they include the tile and the rows around it
-/// that its recovery asked for.
+/// Large photographs need not be in memory whole: `loaded` lists the loaded camera pixels. While a recovery is prepared
+/// they include the [pixels that the preparation reads](crate::recover::preparation_pixels), while a tile is recovered the
+/// tile and the rows around it that its recovery asked for.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Measurements {
     /// The camera grid, `N` pixels.
@@ -66,11 +65,11 @@ pub struct Measurements {
     pub patterns: Vec<Pattern>,
     /// For each pattern the measurement at which a sample saturates: 1 / exposure.
     pub full_scale: Vec<f32>,
-    /// The loaded camera rows.
-    pub rows: CameraRowSet,
-    /// These rows of the `L` photographs.
+    /// The loaded camera pixels.
+    pub loaded: CameraPixelSet,
+    /// These pixels of the `L` photographs.
     pub photos: Vec<LinearPhoto>,
-    /// These rows of the photograph with all light elements lit, if there is one. Nothing is recovered from it.
+    /// These pixels of the photograph with all light elements lit, if there is one. Nothing is recovered from it.
     pub flood: Option<LinearPhoto>,
     /// Variance of the samples.
     pub noise: NoiseModel,
@@ -102,22 +101,22 @@ impl Measurements {
         sample.map_or(f64::NAN, |(n, flood)| f64::from(flood[n][c]))
     }
 
-    /// Index of a pixel in `photos`, if its row is loaded.
+    /// Index of a pixel in `photos`, if it is loaded.
+    #[inline]
     pub fn pixel_index(&self, pixel: CameraPixel) -> Option<usize> {
-        let row = self.rows.index_of(pixel.y)?;
-        Some(row * self.camera.width as usize + pixel.x as usize)
+        self.loaded.index_of(pixel)
     }
 
-    /// Unloads all rows and frees their memory.
-    pub fn clear_rows(&mut self) {
-        self.rows = CameraRowSet::from_strips([]);
+    /// Unloads all pixels and frees their memory.
+    pub fn unload(&mut self) {
+        self.loaded = CameraPixelSet::row_range(0..0, self.camera.width);
         self.photos.fill(LinearPhoto::new());
         self.flood = None;
     }
 
     /// Whether all pixels of a tile are loaded.
     pub fn has_tile(&self, rect: TileRect) -> bool {
-        self.rows.contains_all(rect.y..rect.y + rect.extent.height)
+        self.loaded.contains_all(rect)
     }
 
     /// Variance of a sample `y` of channel `c` under pattern `l`.

@@ -5,12 +5,13 @@
 //! `(code − black) / (white − black)`.
 //!
 //! Reading files needs the feature `capture`. Photographs are read row by row from the top, so that captures larger
-//! than memory can be recovered strip by strip ([`CameraRowSet`]).
+//! than memory can be recovered strip by strip ([`CameraPixelSet`]).
 
+mod camera_pixel_set;
 mod camera_row_set;
 #[cfg(feature = "capture")]
 mod code_statistics;
-#[cfg(any(test, all(feature = "capture", not(target_arch = "wasm32"))))]
+#[cfg(not(target_arch = "wasm32"))]
 mod defective_pixels;
 mod error;
 #[cfg(feature = "capture")]
@@ -21,11 +22,14 @@ mod measurements;
 mod noise_estimate;
 mod noise_model;
 
+pub use camera_pixel_set::CameraPixelSet;
 pub use camera_row_set::CameraRowSet;
 #[cfg(feature = "capture")]
 pub use code_statistics::CodeStatistics;
-#[cfg(any(test, all(feature = "capture", not(target_arch = "wasm32"))))]
+#[cfg(not(target_arch = "wasm32"))]
 pub use defective_pixels::DefectivePixels;
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) use defective_pixels::MARGIN as DEFECT_MARGIN;
 pub use error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 #[cfg(feature = "capture")]
 pub use folder::{
@@ -40,4 +44,6 @@ pub use manifest::{
     PhotographRole, Shot,
 };
 pub use measurements::{LinearPhoto, Measurements, Pattern};
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) use noise_estimate::sample_squares as noise_sample_squares;
 pub use noise_model::NoiseModel;

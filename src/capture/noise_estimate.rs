@@ -8,7 +8,7 @@
 use super::measurements::Measurements;
 use super::noise_model::{NoiseModel, quantile};
 use crate::linalg::{ascending_order, mirror_upper, symmetric_eigen};
-use crate::transport::{CHANNELS, CameraPixel};
+use crate::transport::{CHANNELS, Extent, TileRect};
 
 /// Camera pixels along a side of a block. At two pixels a light element, signal then takes a minority of the ranks.
 const BLOCK_SIDE: u32 = 3;
@@ -28,7 +28,9 @@ impl NoiseModel {
     /// shots.
     pub fn with_gain_from(measurements: &Measurements) -> Self {
         let mut noise = measurements.noise;
-        let blocks = blocks(measurements);
+        let squares = sample_squares(measurements.camera);
+        let blocks = squares.filter_map(|square| NoiseEstimationPatch::at(measurements, square));
+        let blocks: Vec<NoiseEstimationPatch> = blocks.collect();
         for round in 0..GAIN_ROUNDS {
             let last = (round > 0).then_some(noise);
             noise.gain = estimate_gain(&blocks, noise.floor, last);
@@ -49,31 +51,26 @@ struct NoiseEstimationPatch {
     mean_full_scale: f64,
 }
 
-/// At most [`MAX_BLOCKS`] blocks, spread evenly over the loaded rows.
-fn blocks(measurements: &Measurements) -> Vec<NoiseEstimationPatch> {
-    let columns = measurements.camera.width / BLOCK_SIDE;
-    let strips = measurements.rows.strips().iter();
-    let tops: Vec<u32> = strips
-        .flat_map(|strip| {
-            let rows = (strip.len() as u32) / BLOCK_SIDE;
-            (0..rows).map(|row| strip.start + row * BLOCK_SIDE)
-        })
-        .collect();
-    let count = columns as usize * tops.len();
+/// The squares of the picture that the gain is estimated from: at most [`MAX_BLOCKS`], spread evenly.
+pub(crate) fn sample_squares(camera: Extent) -> impl Iterator<Item = TileRect> {
+    let columns = camera.width / BLOCK_SIDE;
+    let count = columns as usize * (camera.height / BLOCK_SIDE) as usize;
     let stride = count.div_ceil(MAX_BLOCKS).max(1);
-    let positions = (0..count).step_by(stride).map(|i| {
+    (0..count).step_by(stride).map(move |i| {
         let row = i as u32 / columns;
         // Shifted from row to row, so that the blocks do not line up in columns.
         let column = (i as u32 % columns + row * 7) % columns;
-        (column * BLOCK_SIDE, tops[row as usize])
-    });
-    let blocks = positions.filter_map(|(x, y)| NoiseEstimationPatch::at(measurements, x, y));
-    blocks.collect()
+        TileRect {
+            x: column * BLOCK_SIDE,
+            y: row * BLOCK_SIDE,
+            extent: Extent::new(BLOCK_SIDE, BLOCK_SIDE),
+        }
+    })
 }
 
 impl NoiseEstimationPatch {
-    /// The block with `(x, y)` at its top left; `None` if it is saturated too often.
-    fn at(measurements: &Measurements, x: u32, y: u32) -> Option<Self> {
+    /// The samples of a square; `None` if it is saturated too often.
+    fn at(measurements: &Measurements, square: TileRect) -> Option<Self> {
         let mut block = Self {
             samples: Vec::with_capacity(measurements.patterns.len() * BLOCK_SERIES),
             weights: Vec::new(),
@@ -82,13 +79,10 @@ impl NoiseEstimationPatch {
         };
         for (l, full_scale) in measurements.full_scale.iter().enumerate() {
             let mut samples = [0.0; BLOCK_SERIES];
-            for (j, sample) in samples.iter_mut().enumerate() {
-                let (pixel, c) = (j as u32 / CHANNELS as u32, j % CHANNELS);
-                let pixel = CameraPixel {
-                    x: x + pixel % BLOCK_SIDE,
-                    y: y + pixel / BLOCK_SIDE,
-                };
-                *sample = measurements.sample(l, pixel, c);
+            for (pixel, samples) in square.pixels().zip(samples.chunks_exact_mut(CHANNELS)) {
+                for (c, sample) in samples.iter_mut().enumerate() {
+                    *sample = measurements.sample(l, pixel, c);
+                }
             }
             if samples.iter().all(|y| y.is_finite()) {
                 let full_scale = f64::from(*full_scale);
@@ -215,11 +209,10 @@ fn estimate_gain(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::{CameraRowSet, LinearPhoto, Pattern};
+    use crate::capture::{CameraPixelSet, LinearPhoto, Pattern};
     use crate::simulate::{
         Camera, EmissionMatrix, PatternEnsemble, PatternImage, RandomStreamId, SceneKind,
     };
-    use crate::transport::{Extent, TileRect};
 
     /// Photographs a scene with `electrons` at full scale, every third shot at twice the exposure, and less a dark
     /// frame; channel 1 as if binned from two samples.
@@ -276,7 +269,7 @@ mod tests {
             full_scale: (1..=patterns as usize)
                 .map(|i| exposure(i).recip() as f32)
                 .collect(),
-            rows: CameraRowSet::all(camera.height),
+            loaded: CameraPixelSet::all(camera),
             photos: photos.map(less_dark).collect(),
             flood: None,
             noise,

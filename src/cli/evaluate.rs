@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::finest_level::FinestLevel;
 use super::ltm_file::PrefixLength;
 use super::report::{format_bytes, print_json, print_line};
-use crate::capture::{CameraRowSet, CaptureFolder, GroundTruth, PhotographRowReader};
+use crate::capture::{CameraPixelSet, CaptureFolder, GroundTruth, PhotographRowReader};
 use crate::relight::{BuiltinLight, Light};
 use crate::study::{CaptureTruth, psnr};
 use crate::transport::{CHANNELS, Decibels, Geometry, SnrAccumulator, transport_error};
@@ -274,9 +274,10 @@ fn add_error(
 ) -> Result<SampleMoments> {
     let mut moments = SampleMoments::default();
     let mut photo = Vec::new();
+    let width = file.geometry.camera.width;
     file.relight(light, |rows, picture| {
         photo.clear();
-        reader.read(&CameraRowSet::from_strips([rows]), &mut photo)?;
+        reader.read(&CameraPixelSet::row_range(rows, width), &mut photo)?;
         for (predicted, measured) in picture.iter().zip(&photo) {
             for c in 0..CHANNELS {
                 if measured[c].is_finite() {

@@ -12,7 +12,7 @@ use super::process_resources::AllCoresExecutor;
 use super::recover::MethodName;
 use super::study_faults::FaultStudy;
 use super::value_parsers::{UsageError, value_name};
-use crate::capture::{CameraRowSet, CaptureFolder, Measurements};
+use crate::capture::{CameraPixelSet, CameraRowSet, CaptureFolder, Measurements};
 use crate::relight::Light;
 use crate::simulate::{SceneKind, SimulatedCapture, SimulatedScene, WINDOW_SIDE, first_shots};
 use crate::study::{self, CaptureTruth, EvaluationLight, ProgressLog, ReportSection, SNR_PATTERNS};
@@ -255,11 +255,11 @@ fn simulated_capture(scene: &dyn SimulatedScene) -> SimulatedCapture<'_> {
 
 fn read_measurements(folder: &CaptureFolder) -> Result<Measurements> {
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
-    let rows = CameraRowSet::all(folder.manifest().camera.height);
+    let camera = folder.manifest().camera.extent();
     let dark = folder.read_dark()?;
-    let mut measurements = read_patterns(folder, &dark, &shots, &rows)?;
+    let mut measurements = read_patterns(folder, &dark, &shots, &CameraRowSet::all(camera.height))?;
     let reader = MeasurementReader::open(folder, &dark, &shots)?;
-    reader.read_sample(&mut measurements, &rows, CORES)?;
+    reader.read_sample(&mut measurements, &CameraPixelSet::all(camera), CORES)?;
     Ok(measurements)
 }
 

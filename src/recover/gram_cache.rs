@@ -249,7 +249,7 @@ mod tests {
     use super::super::preparation_input;
     use super::*;
     use crate::capture::Measurements;
-    use crate::capture::{CameraRowSet, NoiseModel, Pattern};
+    use crate::capture::{CameraPixelSet, NoiseModel, Pattern};
     use crate::transport::{CHANNELS, Correspondence};
 
     const LIGHT: Extent = Extent::new(7, 6);
@@ -265,7 +265,7 @@ mod tests {
             correspondence: Correspondence::from_affine([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
             patterns: patterns.collect(),
             full_scale: (0..PATTERNS).map(|l| 0.5 + 0.2 * l as f32).collect(),
-            rows: CameraRowSet::all(LIGHT.height),
+            loaded: CameraPixelSet::all(LIGHT),
             photos: Vec::new(),
             flood: None,
             noise: NoiseModel {

@@ -1,6 +1,6 @@
 //! Synthetic problems with known properties.
 
-use crate::capture::{CameraRowSet, Measurements, NoiseModel, Pattern};
+use crate::capture::{CameraPixelSet, Measurements, NoiseModel, Pattern};
 use crate::transport::{
     CHANNELS, Correspondence, Extent, Geometry, TileRect, TileTransportFunctions, Window,
 };
@@ -139,7 +139,7 @@ impl SyntheticCapture {
                 correspondence: geometry.correspondence.clone(),
                 full_scale: vec![1.0; patterns.len()],
                 patterns,
-                rows: CameraRowSet::all(geometry.camera.height),
+                loaded: CameraPixelSet::all(geometry.camera),
                 photos: Vec::new(),
                 flood: None,
                 noise: NoiseModel {

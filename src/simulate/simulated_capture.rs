@@ -4,7 +4,7 @@ use super::camera::{Camera, RandomStreamId};
 use super::emission_matrix::EmissionMatrix;
 use super::pattern_image::{PatternEnsemble, PatternImage, emission};
 use super::simulated_scene::SimulatedScene;
-use crate::capture::{CameraRowSet, LinearPhoto, Measurements, NoiseModel, Pattern};
+use crate::capture::{CameraPixelSet, LinearPhoto, Measurements, NoiseModel, Pattern};
 use crate::job_executor::Executor;
 use crate::transport::{CHANNELS, CameraPixel, Geometry, KnownTransport};
 
@@ -50,7 +50,7 @@ impl SimulatedCapture<'_> {
             correspondence: geometry.correspondence.clone(),
             patterns: codes.iter().map(emitted_pattern).collect(),
             full_scale: vec![1.0; count],
-            rows: CameraRowSet::all(geometry.camera.height),
+            loaded: CameraPixelSet::all(geometry.camera),
             photos: self.photographs(&codes, executor),
             flood: None,
             noise: NoiseModel::from_dark(&self.dark(), geometry.camera.width, code),
@@ -166,7 +166,7 @@ pub fn first_shots(measurements: &Measurements, count: usize) -> Measurements {
     let mut first = Measurements {
         patterns: measurements.patterns[..count].to_vec(),
         full_scale: measurements.full_scale[..count].to_vec(),
-        rows: measurements.rows.clone(),
+        loaded: measurements.loaded.clone(),
         photos: measurements.photos[..count].to_vec(),
         flood: measurements.flood.clone(),
         correspondence: measurements.correspondence.clone(),

@@ -87,7 +87,7 @@ mod tests {
     use rand_distr::{Distribution, StandardUniform};
 
     use super::*;
-    use crate::capture::{CameraRowSet, NoiseModel, Pattern};
+    use crate::capture::{CameraPixelSet, NoiseModel, Pattern};
     use crate::job_executor::SequentialExecutor;
     use crate::simulate::RandomStreamId;
     use crate::transport::{CHANNELS, Correspondence, Extent};
@@ -114,7 +114,7 @@ mod tests {
             light: Extent::new(4, 4),
             correspondence: Correspondence::from_affine([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
             full_scale: vec![1.0; 10],
-            rows: CameraRowSet::all(1),
+            loaded: CameraPixelSet::all(Extent::new(1, 1)),
             photos: patterns.iter().map(seen).collect(),
             flood: None,
             noise: NoiseModel {

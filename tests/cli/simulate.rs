@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use assert_cmd::Command;
 use relightable_photo::calibrate::LightPlaneAxis;
-use relightable_photo::capture::{CameraRowSet, CaptureFolder, LinearPhoto, Pattern};
+use relightable_photo::capture::{CameraPixelSet, CaptureFolder, LinearPhoto, Pattern};
 use relightable_photo::simulate::{
     Camera, EmissionMatrix, PatternImage, RandomStreamId, SceneKind, SimulatedScene,
 };
@@ -119,8 +119,8 @@ fn photographs_and_relit_pictures_match_the_known_transport() {
                 panic!("patterns are grey")
             };
             let (mut shot, mut photo) = (folder.open_shot(i, &dark).unwrap(), LinearPhoto::new());
-            let rows = CameraRowSet::all(folder.manifest().camera.height);
-            shot.read(&rows, &mut photo).unwrap();
+            let pixels = CameraPixelSet::all(folder.manifest().camera.extent());
+            shot.read(&pixels, &mut photo).unwrap();
             assert_eq!(shot.finish().unwrap().saturated, 0, "saturated samples");
             let light: Vec<_> = pattern.iter().map(|&p| [f64::from(p); CHANNELS]).collect();
             for (expected, measured) in picture(&folder, &light).iter().zip(&photo) {

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use half::f16;
 use png::{BitDepth, ColorType};
 use relightable_photo::capture::{
-    CameraRowSet, LinearPhoto, Manifest, Measurements, NoiseModel, Pattern,
+    CameraPixelSet, LinearPhoto, Manifest, Measurements, NoiseModel, Pattern,
 };
 use relightable_photo::transport::{CHANNELS, Window};
 
@@ -68,7 +68,7 @@ pub fn measurements() -> Measurements {
         correspondence: manifest.correspondence.unwrap(),
         patterns: SHOTS.iter().map(|(png, _)| pattern(png)).collect(),
         full_scale: vec![1.0; SHOTS.len()],
-        rows: CameraRowSet::all(camera.height),
+        loaded: CameraPixelSet::all(camera.extent()),
         photos: SHOTS.iter().map(|(_, png)| picture(png)).collect(),
         flood: None,
         noise: NoiseModel::from_dark(&dark, camera.width, code),

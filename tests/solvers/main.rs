@@ -168,7 +168,7 @@ fn report(line: &str) {
 #[test]
 fn embedded_fixture_equals_its_folder() {
     use relightable_photo::capture::{
-        CameraRowSet, CaptureFolder, LinearPhoto, NoiseModel, PhotographRowReader,
+        CameraPixelSet, CaptureFolder, LinearPhoto, NoiseModel, PhotographRowReader,
     };
 
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/glass-s");
@@ -180,10 +180,10 @@ fn embedded_fixture_equals_its_folder() {
     let correspondence = folder.manifest().correspondence.clone().unwrap();
     let mut read =
         folder.empty_measurements(&shots, patterns.collect(), correspondence, dark.noise());
-    read.rows = CameraRowSet::all(read.camera.height);
+    read.loaded = CameraPixelSet::all(read.camera);
     let whole = |mut photo: PhotographRowReader| {
         let mut picture = LinearPhoto::new();
-        photo.read(&read.rows, &mut picture).unwrap();
+        photo.read(&read.loaded, &mut picture).unwrap();
         picture
     };
     let pictures = shots
@@ -195,7 +195,7 @@ fn embedded_fixture_equals_its_folder() {
     assert_eq!(embedded.correspondence, read.correspondence);
     assert_eq!(embedded.patterns, read.patterns);
     assert_eq!(embedded.full_scale, read.full_scale);
-    assert_eq!(embedded.rows, read.rows);
+    assert_eq!(embedded.loaded, read.loaded);
     assert_eq!(embedded.photos, read.photos);
     assert_eq!(embedded.noise, read.noise);
 

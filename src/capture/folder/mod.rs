@@ -25,6 +25,7 @@ pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
 use self::capture_png::CapturePng;
 use self::files::CaptureFile;
+use super::camera_pixel_set::CameraPixelSet;
 use super::camera_row_set::CameraRowSet;
 use super::code_statistics::CodeStatistics;
 use super::error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
@@ -231,7 +232,8 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         let field = format!("graycode[{i}].photo");
         let mut reader = self.open_photo(&self.manifest.graycode[i].photo, field, 1.0, dark)?;
         let mut photo = LinearPhoto::new();
-        reader.read(rows, &mut photo)?;
+        let pixels = CameraPixelSet::of_rows(rows.clone(), self.manifest.camera.width);
+        reader.read(&pixels, &mut photo)?;
         reader.finish()?;
         Ok(photo)
     }
@@ -304,7 +306,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         Ok(pattern)
     }
 
-    /// Measurements of `shots` without any camera rows yet. Their noise has only its floor.
+    /// Measurements of `shots` without any camera pixels yet. Their noise has only its floor.
     pub fn empty_measurements(
         &self,
         shots: &[usize],
@@ -319,7 +321,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             correspondence,
             patterns,
             full_scale: full_scale.collect(),
-            rows: CameraRowSet::from_strips([]),
+            loaded: CameraPixelSet::row_range(0..0, self.manifest.camera.width),
             photos: vec![LinearPhoto::new(); shots.len()],
             flood: None,
             noise,

@@ -3,7 +3,7 @@
 use super::capture_png::Rgb16RowReader;
 use super::disk_files::DiskFiles;
 use super::files::CaptureFiles;
-use crate::capture::camera_row_set::CameraRowSet;
+use crate::capture::camera_pixel_set::CameraPixelSet;
 use crate::capture::code_statistics::CodeStatistics;
 use crate::capture::error::CaptureError;
 use crate::capture::manifest::ManifestCamera;
@@ -37,18 +37,18 @@ pub struct PhotographRowReader<'a, F: CaptureFiles = DiskFiles> {
 }
 
 impl<F: CaptureFiles> PhotographRowReader<'_, F> {
-    /// Appends those of `rows` that were not read before to `photo`, as measurements minus the dark frame, NaN where
-    /// saturated. Skips the rows between them.
+    /// Appends those of `pixels` whose rows were not read before to `photo`, as measurements minus the dark frame, NaN where
+    /// saturated. Skips the others.
     ///
     /// # Errors
     /// If the file is damaged or ends early.
     pub fn read(
         &mut self,
-        rows: &CameraRowSet,
+        pixels: &CameraPixelSet,
         photo: &mut LinearPhoto,
     ) -> Result<(), CaptureError> {
-        let end = rows.strips().last().map_or(0, |strip| strip.end);
-        self.read_to(end, rows, photo)
+        let end = pixels.rows().strips().last().map_or(0, |strip| strip.end);
+        self.read_to(end, pixels, photo)
     }
 
     /// Reads the whole photograph, as [`read`](Self::read) does, and the statistics of its codes.
@@ -57,7 +57,7 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
     /// If the file is damaged or ends early.
     pub fn read_all(mut self) -> Result<(LinearPhoto, CodeStatistics), CaptureError> {
         let mut photo = Vec::with_capacity(self.camera.extent().area());
-        self.read(&CameraRowSet::all(self.camera.height), &mut photo)?;
+        self.read(&CameraPixelSet::all(self.camera.extent()), &mut photo)?;
         Ok((photo, self.finish()?))
     }
 
@@ -66,17 +66,17 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
     /// # Errors
     /// If the file is damaged or ends early.
     pub fn finish(mut self) -> Result<CodeStatistics, CaptureError> {
-        let none = CameraRowSet::from_strips([]);
+        let none = CameraPixelSet::row_range(0..0, self.camera.width);
         self.read_to(self.camera.height, &none, &mut LinearPhoto::new())?;
         self.codes.finish()?;
         Ok(self.statistics)
     }
 
-    /// Reads up to row `end` and appends those of `rows`.
+    /// Reads up to row `end` and appends those of `pixels`.
     fn read_to(
         &mut self,
         end: u32,
-        rows: &CameraRowSet,
+        pixels: &CameraPixelSet,
         photo: &mut LinearPhoto,
     ) -> Result<(), CaptureError> {
         let width = self.camera.width as usize;
@@ -85,8 +85,10 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
             && let Some(codes) = self.codes.next()?
         {
             self.statistics.add_row(codes, saturated_from);
-            if rows.contains(self.next_row) {
-                let dark = &self.dark.light[self.next_row as usize * width..][..width];
+            let dark = &self.dark.light[self.next_row as usize * width..][..width];
+            for span in pixels.spans_of(self.next_row) {
+                let span = span.start as usize..span.end as usize;
+                let (codes, dark) = (&codes[span.clone()], &dark[span]);
                 photo.extend(self.camera.measure(codes, self.exposure, dark));
             }
             self.next_row += 1;

@@ -1,9 +1,9 @@
-//! A photograph that is decoded once, for all that is asked of it: its codes in some rows, and statistics of all codes.
+//! A photograph that is decoded once, for all that is asked of it: the codes of some pixels, and statistics of all codes.
 
 use super::CaptureFolder;
 use super::capture_png::CapturePng;
 use super::files::CaptureFiles;
-use crate::capture::camera_row_set::CameraRowSet;
+use crate::capture::camera_pixel_set::CameraPixelSet;
 use crate::capture::code_statistics::CodeStatistics;
 use crate::capture::error::CaptureError;
 use crate::capture::manifest::ListedPhotograph;
@@ -12,8 +12,8 @@ use crate::transport::CHANNELS;
 /// What a photograph is examined by.
 #[derive(Clone, Debug)]
 pub struct PhotographScan {
-    /// The codes of the rows that were asked for, `[rows, width]`.
-    pub rows: Vec<[u16; CHANNELS]>,
+    /// The codes of the pixels that were asked for, row by row.
+    pub pixels: Vec<[u16; CHANNELS]>,
     /// Of all rows.
     pub codes: CodeStatistics,
     /// Of all codes: photographs with noise that share it, and their statistics, are one and the same.
@@ -21,20 +21,20 @@ pub struct PhotographScan {
 }
 
 impl<F: CaptureFiles> CaptureFolder<F> {
-    /// Decodes a photograph that the manifest names, and keeps the codes of `rows`.
+    /// Decodes a photograph that the manifest names, and keeps the codes of `pixels`.
     ///
     /// # Errors
     /// If it is missing, not a 16-bit PNG of the camera's size, or damaged.
     pub fn scan(
         &self,
         photograph: ListedPhotograph<'_>,
-        rows: &CameraRowSet,
+        pixels: &CameraPixelSet,
     ) -> Result<PhotographScan, CaptureError> {
         let camera = &self.manifest.camera;
         let mut reader = self.png(photograph).open_rgb16()?;
         let saturated_from = camera.saturated_from();
         let mut scan = PhotographScan {
-            rows: Vec::with_capacity(rows.count() * camera.width as usize),
+            pixels: Vec::with_capacity(pixels.count()),
             codes: CodeStatistics::of_photograph(),
             checksum: 0,
         };
@@ -44,8 +44,9 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             };
             scan.codes.add_row(codes, saturated_from);
             scan.checksum = crc32c::crc32c_append(scan.checksum, bytemuck::cast_slice(codes));
-            if rows.contains(y) {
-                scan.rows.extend_from_slice(codes);
+            for span in pixels.spans_of(y) {
+                let span = span.start as usize..span.end as usize;
+                scan.pixels.extend_from_slice(&codes[span]);
             }
         }
         reader.finish()?;

@@ -4,7 +4,7 @@ use super::basis::LearnedBasis;
 use super::equations::{ObservationEquations, PixelObservation};
 use super::posterior::{PosteriorSolver, PriorPrecision};
 use super::*;
-use crate::capture::{CameraRowSet, Measurements, NoiseModel, Pattern};
+use crate::capture::{CameraPixelSet, Measurements, NoiseModel, Pattern};
 use crate::job_executor::{Executor, SequentialExecutor};
 use crate::recover::sampling::pixels_by_window;
 use crate::recover::{TailEstimate, WindowSizeEstimate, mean_function, pattern_check};
@@ -119,7 +119,7 @@ fn photograph(patterns: usize, seed: u64, tau: &[[f64; CHANNELS]]) -> Measuremen
         correspondence: geometry.correspondence,
         patterns: emissions.into_iter().map(Pattern::Grey).collect(),
         full_scale: vec![1.0; patterns],
-        rows: CameraRowSet::all(SIDE),
+        loaded: CameraPixelSet::all(Extent::new(SIDE, SIDE)),
         photos: pictures,
         flood: None,
         noise: NoiseModel {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::measurement_input::MeasurementInput;
-use crate::capture::{CameraRowSet, Measurements, NoiseModel};
+use crate::capture::{CameraPixelSet, Measurements, NoiseModel};
 use crate::export::Provenance;
 use crate::web::CodedError;
 use crate::web::photo_transfer::corrupt;
@@ -72,7 +72,7 @@ impl CaptureBuilder {
         if self.count < measurements.photos.len() {
             return Err(corrupt());
         }
-        measurements.rows = CameraRowSet::all(measurements.camera.height);
+        measurements.loaded = CameraPixelSet::all(measurements.camera);
         measurements.noise = NoiseModel::with_gain_from(&measurements);
         Ok(MeasurementInput {
             measurements: Arc::new(measurements),

@@ -7,7 +7,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::measurement_input::MeasurementInput;
 use crate::calibrate::{GrayCodePhotos, LightPlaneAxis};
 use crate::capture::{
-    CameraRowSet, LinearPhoto, ManifestLight, Measurements, NoiseModel, Pattern, group_count,
+    CameraPixelSet, LinearPhoto, ManifestLight, Measurements, NoiseModel, Pattern, group_count,
     group_ids,
 };
 use crate::export::Provenance;
@@ -179,7 +179,7 @@ impl MeasurementBuilder {
             correspondence,
             patterns: self.patterns,
             full_scale: self.full_scale,
-            rows: CameraRowSet::all(self.camera.height),
+            loaded: CameraPixelSet::all(self.camera),
             photos: self.photos,
             flood: None,
             noise: NoiseModel::from_dark(dark, self.camera.width, self.quantum),

@@ -3,7 +3,7 @@
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::recovery_job::encoded_tile;
-use crate::capture::{CameraRowSet, LinearPhoto, Measurements};
+use crate::capture::{CameraPixelSet, LinearPhoto, Measurements};
 use crate::recover::PreparedRecovery;
 use crate::web::CodedError;
 use crate::web::photo_transfer::corrupt;
@@ -31,7 +31,7 @@ impl TileRecovery {
             light: geometry.light,
             correspondence: geometry.correspondence.clone(),
             patterns,
-            rows: CameraRowSet::from_strips([]),
+            loaded: CameraPixelSet::row_range(0..0, geometry.camera.width),
             photos: vec![LinearPhoto::new(); full_scale.len()],
             flood: None,
             full_scale,
@@ -52,7 +52,7 @@ impl TileRecovery {
         let Measurements {
             camera,
             photos,
-            rows,
+            loaded,
             ..
         } = &mut self.measurements;
         let (pixels, _) = samples.as_chunks();
@@ -68,7 +68,7 @@ impl TileRecovery {
         for (photo, pixels) in photos.iter_mut().zip(pixels.chunks_exact(per_photo.max(1))) {
             *photo = pixels.to_vec();
         }
-        *rows = CameraRowSet::from_strips(std::iter::once(first..first + count));
+        *loaded = CameraPixelSet::row_range(first..first + count, camera.width);
         Ok(())
     }
 
