@@ -5,13 +5,13 @@ use rayon::prelude::*;
 
 use super::progress;
 use crate::capture::{
-    CameraRowSet, CaptureError, CaptureFolder, CodeStatistics, DarkFrame, DefectivePixels,
-    LinearPhoto, Measurements, NoiseModel, PhotographRowReader,
+    CameraPixelSet, CameraRowSet, CaptureError, CaptureFolder, CodeStatistics, DarkFrame,
+    DefectivePixels, LinearPhoto, Measurements, NoiseModel, PhotographRowReader,
 };
 use crate::job_executor::Executor;
 
 /// Reads the patterns of `shots` and the correspondence, by `gray_code_rows` of the Gray code if the manifest does not
-/// give it. The measurements have no camera rows yet.
+/// give it. The measurements have no camera pixels yet.
 pub fn read_patterns(
     folder: &CaptureFolder,
     dark: &DarkFrame,
@@ -33,18 +33,18 @@ pub fn read_patterns(
     Ok(folder.empty_measurements(shots, patterns, correspondence, dark.noise()))
 }
 
-/// Reads `rows` of a photograph, and the rest of the file, which checks that it is whole.
+/// Reads `pixels` of a photograph, and the rest of the file, which checks that it is whole.
 pub fn read_sample_of(
     mut photo: PhotographRowReader<'_>,
-    rows: &CameraRowSet,
+    pixels: &CameraPixelSet,
 ) -> Result<(LinearPhoto, CodeStatistics)> {
     let mut samples = LinearPhoto::new();
-    photo.read(rows, &mut samples)?;
+    photo.read(pixels, &mut samples)?;
     let codes = photo.finish()?;
     Ok((samples, codes))
 }
 
-/// What the rows that were read say beside their samples.
+/// What photographs say beside the samples of the pixels that were loaded.
 #[derive(Clone, Debug, Default)]
 pub struct ReadSample {
     /// Of all rows of the photographs.
@@ -53,7 +53,7 @@ pub struct ReadSample {
     pub codes_by_shot: Vec<CodeStatistics>,
     /// Of all rows of the flood photograph, if there is one.
     pub flood_codes: Option<CodeStatistics>,
-    /// Pixels of the loaded rows that are filled from their neighbours.
+    /// Loaded pixels that are filled from their neighbours.
     pub defects: DefectivePixels,
 }
 
@@ -79,63 +79,64 @@ impl<'a> MeasurementReader<'a> {
         })
     }
 
-    /// Makes `rows` the loaded rows of `measurements`: keeps those it has, reads the others, which must lie below all
-    /// rows read before. Calls `check` before each photograph, and stops if it fails.
-    pub fn load_rows(
+    /// Makes `pixels` the loaded pixels of `measurements`: keeps those of rows that it has, which must be the same, and reads
+    /// the others, which must lie below all rows read before. Calls `check` before each photograph, and stops if it fails.
+    pub fn load(
         &mut self,
         measurements: &mut Measurements,
-        rows: &CameraRowSet,
+        pixels: &CameraPixelSet,
         check: impl Fn() -> Result<()> + Sync,
     ) -> Result<()> {
-        let width = measurements.camera.width as usize;
-        let first = rows.strips().first().map_or(0, |strip| strip.start);
-        let obsolete = measurements.rows.iter().take_while(|y| *y < first).count();
+        let strips = pixels.rows().strips();
+        let first = strips.first().map_or(0, |strip| strip.start);
+        let obsolete = measurements.loaded.count_above(first);
         let photos = measurements.photos.par_iter_mut();
         let shots = self.photos.par_iter_mut().zip(photos);
         shots.try_for_each(|(reader, photo)| {
             check()?;
-            photo.drain(..obsolete * width);
+            photo.drain(..obsolete);
             // Strips have similar heights, so the first reservation is enough for all.
-            photo.reserve_exact((rows.count() * width).saturating_sub(photo.len()));
-            Ok::<_, Error>(reader.read(rows, photo)?)
+            photo.reserve_exact(pixels.count().saturating_sub(photo.len()));
+            Ok::<_, Error>(reader.read(pixels, photo)?)
         })?;
-        measurements.rows = rows.clone();
+        measurements.loaded = pixels.clone();
         Ok(())
     }
 
-    /// Fills the hot and dead pixels of the loaded rows from their neighbours. The photographs have these statistics of
-    /// their `codes`.
+    /// Fills the hot and dead pixels of the loaded rows from `first_row` on. The photographs have these statistics of their
+    /// `codes`.
     pub fn fill_defects(
         &self,
         measurements: &mut Measurements,
+        first_row: u32,
         codes: &CodeStatistics,
     ) -> DefectivePixels {
-        fill_defects(measurements, f64::from(codes.step()) * self.code)
+        measurements.fill_defective_pixels(first_row, f64::from(codes.step()) * self.code)
     }
 
-    /// Loads `rows`, estimates the noise from them, and reads the rest of all files, which checks that they are whole.
+    /// Loads `pixels`, estimates the noise from them, and reads the rest of all files, which checks that they are whole.
     pub fn read_sample(
         mut self,
         measurements: &mut Measurements,
-        rows: &CameraRowSet,
+        pixels: &CameraPixelSet,
         executor: &impl Executor,
     ) -> Result<ReadSample> {
         let bar = progress::bar("reading", self.photos.len());
-        self.load_rows(measurements, rows, || {
+        self.load(measurements, pixels, || {
             bar.inc(1);
             Ok(executor.check_cancelled()?)
         })?;
         drop(bar);
         let codes = self.photos.into_par_iter().map(PhotographRowReader::finish);
         let codes = codes.collect::<Result<Vec<_>, _>>()?;
-        Ok(ReadSample::of_rows(measurements, codes, self.code))
+        Ok(ReadSample::new(measurements, codes, self.code))
     }
 }
 
 impl ReadSample {
-    /// Fills the defective pixels of the rows that were read into `measurements`, whose noise has only its floor, and
+    /// Fills the defective pixels of those that were read into `measurements`, whose noise has only its floor, and
     /// estimates the gain from them. A code of one is the measurement `code`.
-    pub fn of_rows(
+    pub fn new(
         measurements: &mut Measurements,
         codes_by_shot: Vec<CodeStatistics>,
         code: f64,
@@ -144,7 +145,7 @@ impl ReadSample {
         let codes = codes.fold(CodeStatistics::default(), CodeStatistics::merge);
         let quantum = f64::from(codes.step()) * code;
         measurements.noise = measurements.noise.with_quantum(quantum);
-        let defects = fill_defects(measurements, quantum);
+        let defects = measurements.fill_defective_pixels(0, quantum);
         measurements.noise = NoiseModel::with_gain_from(measurements);
         Self {
             codes,
@@ -152,13 +153,5 @@ impl ReadSample {
             flood_codes: None,
             defects,
         }
-    }
-}
-
-/// Fills hot and dead pixels where codes are `quantum` apart.
-fn fill_defects(measurements: &mut Measurements, quantum: f64) -> DefectivePixels {
-    DefectivePixels {
-        hot: measurements.fill_hot_pixels(),
-        dead: measurements.fill_dead_pixels(quantum),
     }
 }

@@ -3,7 +3,6 @@
 use std::io::{self, ErrorKind};
 use std::ops::Range;
 
-use super::memory_plan::FILE_TILE_SIDE;
 use super::tile_record;
 use crate::format::{
     ChunkStore, DistortionMetric, EncodedFile, EncoderInput, EncodingTarget, FormatError, Metadata,
@@ -12,6 +11,9 @@ use crate::job_executor::Executor;
 use crate::recover::{HoldoutValidation, PreparedRecovery};
 use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileTransportFunctions};
 
+/// Camera pixels along a side of a tile in the file. Larger tiles than those of the recovery compress better; these are
+/// still small enough to load only the visible ones.
+pub(super) const FILE_TILE_SIDE: u32 = 128;
 /// Default loss of SNR by the file, as hold-out validation estimates it. Validation recovers from fewer patterns, and
 /// so with slightly more noise.
 const DEFAULT_LOSS: Decibels = Decibels(0.5);

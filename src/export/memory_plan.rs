@@ -1,20 +1,18 @@
 //! Shares the memory limit of a recovery out between photographs and tiles.
 //!
-//! All photographs are loaded if they fit beside one tile. Otherwise half of what remains after the fixed costs holds
-//! strips of rows, the rest tiles. Only the number of tiles at once depends on the number of threads, so that the
-//! loaded rows, and the result, do not.
+//! All photographs are loaded if they fit beside one tile. Otherwise the recovery is prepared from the pixels that this
+//! takes, then half of what remains after the fixed costs holds strips of rows, the rest tiles. What a recovery is prepared
+//! from depends on the capture alone, and so does its result: not on the limit, nor on the number of threads.
 
 use std::ops::Range;
 
 use thiserror::Error;
 
-use crate::capture::CameraRowSet;
-use crate::recover::Method;
+use super::encoding::FILE_TILE_SIDE;
+use crate::capture::{CameraPixelSet, CameraRowSet};
+use crate::recover::{Method, WindowSizeEstimate, preparation_pixels};
 use crate::transport::{CHANNELS, Extent, Geometry, Window};
 
-/// Camera pixels along a side of a tile in the file. Larger tiles than those of the recovery compress better; these are
-/// still small enough to load only the visible ones.
-pub(super) const FILE_TILE_SIDE: u32 = 128;
 /// Camera pixels along a side of a recovered tile.
 const TILE_SIDE: u32 = Geometry::DEFAULT_TILE_SIDE;
 /// All channels of one camera pixel or light element.
@@ -30,6 +28,10 @@ const COMPRESSOR_BYTES: u64 = 24 << 20;
 const ENCODED_VALUE_BYTES: u64 = 60;
 /// Choosing the quantisation step of the file.
 const RATE_CONTROL_BYTES: u64 = 64 << 20;
+/// Pixels of the Gray code photographs that are decoded: several for each control point of a displacement.
+const MAX_GRAY_CODE_PIXELS: usize = 1 << 20;
+/// The decoded position of a camera pixel.
+const POSITION_BYTES: u64 = 64;
 
 /// A memory limit that is too low for a capture, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -41,70 +43,114 @@ pub struct TooLittleMemory {
     pub min: u64,
 }
 
+/// What a capture takes memory by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CaptureSize {
+    /// The camera grid.
+    pub camera: Extent,
+    /// The light plane.
+    pub light: Extent,
+    /// Number of photographs to recover from.
+    pub shots: usize,
+    /// Number of Gray code photographs to decode.
+    pub gray_code: usize,
+}
+
 /// How the memory limit is used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryPlan {
-    /// Bytes for rows of photographs.
-    photograph_bytes: u64,
-    /// Bytes of one camera row of all photographs.
-    row_bytes: u64,
     camera: Extent,
+    /// The pixels to prepare the recovery from.
+    sample: CameraPixelSet,
+    gray_code_rows: CameraRowSet,
+    /// Number of camera rows of the photographs that are loaded at once.
+    rows_at_once: u32,
     /// Number of tiles recovered at once.
     tiles_at_once: usize,
     threads: usize,
     limit: u64,
-    fixed_bytes: u64,
 }
 
 impl MemoryPlan {
-    /// A plan for recovery by `method` in `window` from `shots` photographs on at most `threads` threads, within
-    /// `limit` bytes.
+    /// A plan for recovery of a capture of this `size` by `method` on at most `threads` threads, within `limit` bytes;
+    /// `window` is `None` if it is estimated.
     ///
     /// # Errors
-    /// If the limit is too low for one tile.
+    /// If the limit is too low for what the recovery is prepared from, or for one tile.
     pub fn new(
         limit: u64,
-        (camera, light): (Extent, Extent),
-        shots: usize,
+        size: CaptureSize,
         method: Method,
-        window: Window,
+        window: Option<Window>,
         threads: usize,
     ) -> Result<Self, TooLittleMemory> {
+        let CaptureSize {
+            camera,
+            light,
+            shots,
+            gray_code,
+        } = size;
+        let max_window = window.unwrap_or(WindowSizeEstimate::MAX_WINDOW);
         let photographs = shots as u64;
         let width = u64::from(camera.width);
         let fixed_bytes = PROGRAM_BYTES
-            + method.preparation_bytes(window, shots) as u64
+            + method.preparation_bytes(max_window, shots) as u64
             + PIXEL_BYTES * camera.area() as u64 // the dark frame
             + PIXEL_BYTES * (shots * light.area()) as u64 // patterns, of any colour
             + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width);
         // The functions of a tile as real numbers, as codes, and as byte planes to compress.
         let element = PIXEL_BYTES + 8 + 2 * CHANNELS as u64;
         let tile = COMPRESSOR_BYTES
-            + method.tile_bytes(window, shots) as u64
-            + element * u64::from(TILE_SIDE * TILE_SIDE) * window.area() as u64;
-        let mut plan = Self {
-            photograph_bytes: 0,
-            row_bytes: (photographs + 1) * PIXEL_BYTES * width, // and the flood photograph
+            + method.tile_bytes(max_window, shots) as u64
+            + element * u64::from(TILE_SIDE * TILE_SIDE) * max_window.area() as u64;
+        let pixel_bytes = (photographs + 1) * PIXEL_BYTES; // and the flood photograph
+        let row_bytes = pixel_bytes * width;
+        // Photographs may be resampled while the recovery is prepared.
+        let resampled = Method::resampled_bytes(shots) as u64;
+        let prepared = |bytes: u64| bytes + bytes.min(resampled);
+        let gray_code_rows = gray_code_rows(camera);
+        let gray_code_pixel = gray_code as u64 * PIXEL_BYTES + POSITION_BYTES;
+        let gray_code_bytes = match gray_code {
+            0 => 0,
+            _ => gray_code_pixel * width * gray_code_rows.count() as u64,
+        };
+        let sample = preparation_pixels(camera, method, window);
+        let sample_bytes = pixel_bytes * sample.count() as u64;
+        let all_bytes = row_bytes * u64::from(camera.height);
+        let min_rows = (TILE_SIDE + 2 * method.max_halo()).min(camera.height);
+        let min_bytes = row_bytes * u64::from(min_rows);
+        // One after the other: Gray code, the preparation, and the tiles.
+        let least = |loaded: u64, sample: u64| {
+            fixed_bytes + (loaded + tile).max(prepared(sample)).max(gray_code_bytes)
+        };
+        let min = match sample_bytes == all_bytes {
+            true => least(all_bytes, all_bytes),
+            false => least(min_bytes, sample_bytes),
+        };
+        if limit < min {
+            return Err(TooLittleMemory { limit, min });
+        }
+        let free = limit - fixed_bytes;
+        let fits_all = least(all_bytes, all_bytes) <= limit;
+        let loaded_bytes = match fits_all {
+            true => all_bytes,
+            false => (free / 2).clamp(min_bytes, free - tile),
+        };
+        Ok(Self {
             camera,
-            tiles_at_once: 0,
+            sample: match fits_all {
+                true => CameraPixelSet::all(camera),
+                false => sample,
+            },
+            gray_code_rows,
+            rows_at_once: match fits_all {
+                true => camera.height,
+                false => u32::try_from(loaded_bytes / row_bytes.max(1)).unwrap_or(u32::MAX),
+            },
+            tiles_at_once: threads.min(((free - loaded_bytes) / tile) as usize),
             threads,
             limit,
-            fixed_bytes,
-        };
-        let all = plan.row_bytes * u64::from(camera.height);
-        // Beside the loaded rows: a tile, or while the recovery is prepared, these rows resampled.
-        let resampled = Method::resampled_bytes(shots) as u64;
-        let beside = |rows: u64| tile.max(rows.min(resampled));
-        let min_rows = (TILE_SIDE + 2 * method.max_halo()).min(camera.height);
-        let min_bytes = plan.row_bytes * u64::from(min_rows);
-        plan.ensure_limit(fixed_bytes + min_bytes + beside(min_bytes))?;
-        let free = limit - fixed_bytes;
-        plan.photograph_bytes = match all + beside(all) <= free {
-            true => all,
-            false => (free / 2).clamp(min_bytes, free - beside(min_bytes)),
-        };
-        plan.tiles_at_once = threads.min(((free - plan.photograph_bytes) / tile) as usize);
-        Ok(plan)
+        })
     }
 
     /// Number of tiles of the file encoded at once, after the photographs are unloaded, for `rank` components and
@@ -121,14 +167,10 @@ impl MemoryPlan {
         let value = ENCODED_VALUE_BYTES * (window.area() + rank) as u64;
         let tile = value * pixels.min(u64::from(FILE_TILE_SIDE).pow(2));
         let fixed = PROGRAM_BYTES + RATE_CONTROL_BYTES.min(value * pixels);
-        self.ensure_limit(fixed + tile)?;
-        Ok(self.threads.min(((self.limit - fixed) / tile) as usize))
-    }
-
-    fn ensure_limit(&self, min: u64) -> Result<(), TooLittleMemory> {
-        match self.limit {
-            limit if limit < min => Err(TooLittleMemory { limit, min }),
-            _ => Ok(()),
+        let (limit, min) = (self.limit, fixed + tile);
+        match limit < min {
+            true => Err(TooLittleMemory { limit, min }),
+            false => Ok(self.threads.min(((limit - fixed) / tile) as usize)),
         }
     }
 
@@ -148,124 +190,131 @@ impl MemoryPlan {
 
     /// Whether all photographs fit in memory.
     pub fn fits_photographs(&self) -> bool {
-        self.max_rows() >= self.camera.height
+        self.rows_at_once >= self.camera.height
     }
 
-    fn max_rows(&self) -> u32 {
-        u32::try_from(self.photograph_bytes / self.row_bytes.max(1)).unwrap_or(u32::MAX)
+    /// The camera pixels to load for the preparation: all if they fit, otherwise those that it reads.
+    pub fn sample(&self) -> &CameraPixelSet {
+        &self.sample
     }
 
-    /// The camera rows to prepare the recovery from: all if they fit, otherwise rows of tiles spread evenly over the
-    /// picture.
-    pub fn sample_rows(&self) -> CameraRowSet {
-        spread_tile_rows(self.camera, self.max_rows())
+    /// The camera rows of Gray code photographs to decode, whatever the limit.
+    pub fn gray_code_rows(&self) -> &CameraRowSet {
+        &self.gray_code_rows
     }
 
     /// Strips of tile rows from the top down, each with the camera rows to load for it: its own and `halo` more on
     /// either side.
-    pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, CameraRowSet)> {
+    pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, Range<u32>)> {
         let tile_rows = self.tile_rows();
         if self.fits_photographs() {
-            return vec![(0..tile_rows, CameraRowSet::all(self.camera.height))];
+            return vec![(0..tile_rows, 0..self.camera.height)];
         }
-        let count = (self.max_rows().saturating_sub(2 * halo) / TILE_SIDE).max(1);
+        let count = (self.rows_at_once.saturating_sub(2 * halo) / TILE_SIDE).max(1);
         let strip = |first: u32| {
             let strip = first..(first + count).min(tile_rows);
-            let rows = self.pixel_rows(strip.clone(), halo);
-            (strip, CameraRowSet::from_strips([rows]))
+            let start = (strip.start * TILE_SIDE).saturating_sub(halo);
+            let end = (strip.end * TILE_SIDE + halo).min(self.camera.height);
+            (strip, start..end)
         };
         (0..tile_rows).step_by(count as usize).map(strip).collect()
     }
-
-    /// Whether so many Gray code photographs fit in memory whole.
-    pub fn fits_gray_code(&self, photographs: usize) -> bool {
-        self.gray_code_rows(photographs).count() == self.camera.height as usize
-    }
-
-    /// The camera rows to decode of so many Gray code photographs: all if they fit, otherwise rows spread evenly over
-    /// the picture.
-    pub fn gray_code_rows(&self, photographs: usize) -> CameraRowSet {
-        // The samples of a pixel and its decoded position.
-        let pixel = photographs as u64 * PIXEL_BYTES + 64;
-        let max_rows = (self.limit - self.fixed_bytes) / (pixel * u64::from(self.camera.width));
-        let interval = u64::from(self.camera.height).div_ceil(max_rows.max(1));
-        let rows = (0..self.camera.height).step_by(interval as usize);
-        CameraRowSet::from_strips(rows.map(|y| y..y + 1))
-    }
-
-    fn pixel_rows(&self, tile_rows: Range<u32>, halo: u32) -> Range<u32> {
-        let start = (tile_rows.start * TILE_SIDE).saturating_sub(halo);
-        start..(tile_rows.end * TILE_SIDE + halo).min(self.camera.height)
-    }
 }
 
-/// All rows if they are at most `max_rows`, otherwise rows of tiles spread evenly over the picture, at least one.
-pub fn spread_tile_rows(camera: Extent, max_rows: u32) -> CameraRowSet {
-    if max_rows >= camera.height {
-        return CameraRowSet::all(camera.height);
-    }
-    let tile_rows = camera.height.div_ceil(TILE_SIDE);
-    let count = (max_rows / TILE_SIDE).clamp(1, tile_rows);
-    // The middles of `count` equal parts.
-    let first_row = |i: u32| (2 * i + 1) * tile_rows / (2 * count) * TILE_SIDE;
-    let strips = (0..count).map(first_row);
-    CameraRowSet::from_strips(strips.map(|y| y..(y + TILE_SIDE).min(camera.height)))
+/// The camera rows of Gray code photographs to decode: all of at most [`MAX_GRAY_CODE_PIXELS`], otherwise so many, evenly
+/// spaced.
+fn gray_code_rows(camera: Extent) -> CameraRowSet {
+    let max_rows = (MAX_GRAY_CODE_PIXELS / camera.width as usize).max(1);
+    let interval = (camera.height as usize).div_ceil(max_rows);
+    let rows = (0..camera.height).step_by(interval);
+    CameraRowSet::from_strips(rows.map(|y| y..y + 1))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn plan(megabytes: u64, threads: usize) -> Result<MemoryPlan, TooLittleMemory> {
-        let extents = (Extent::new(500, 300), Extent::new(64, 64));
-        let window = Window::new(9).unwrap();
-        MemoryPlan::new(megabytes << 20, extents, 80, Method::Nnls, window, threads)
+    /// More than a small picture, of which the preparation reads less than half.
+    const CAMERA: Extent = Extent::new(900, 800);
+
+    fn plan(megabytes: u64, camera: Extent, threads: usize) -> Result<MemoryPlan, TooLittleMemory> {
+        let size = CaptureSize {
+            camera,
+            light: Extent::new(64, 64),
+            shots: 80,
+            gray_code: 24,
+        };
+        let window = Window::new(9).ok();
+        MemoryPlan::new(megabytes << 20, size, Method::Nnls, window, threads)
+    }
+
+    fn min_megabytes(camera: Extent) -> u64 {
+        let TooLittleMemory { limit, min } = plan(30, camera, 2).unwrap_err();
+        assert_eq!(limit, 30 << 20);
+        min.div_ceil(1 << 20)
     }
 
     #[test]
-    fn strips_fit_the_limit_and_cover_every_tile_once() {
-        for megabytes in [190, 210, 250, 400, 4000] {
-            let plan = plan(megabytes, 8).unwrap();
+    fn strips_cover_every_tile_once_with_its_halo() {
+        let least = min_megabytes(CAMERA);
+        for megabytes in [least, least + 50, least + 200, 4000] {
+            let plan = plan(megabytes, CAMERA, 8).unwrap();
             assert!((1..=8).contains(&plan.tiles_at_once));
             for halo in [0, 8] {
                 let mut next = 0;
                 for (strip, rows) in plan.strips(halo) {
                     assert_eq!(strip.start, next);
                     next = strip.end;
-                    let needed =
-                        (strip.start * 32).saturating_sub(halo)..(strip.end * 32 + halo).min(300);
-                    assert!(rows.contains_all(needed));
-                    assert!(rows.count() as u64 * plan.row_bytes <= plan.photograph_bytes);
+                    let start = (strip.start * 32).saturating_sub(halo);
+                    assert!(rows.start <= start && (strip.end * 32 + halo).min(800) <= rows.end);
+                    assert!(rows.len() <= plan.rows_at_once as usize);
                 }
-                assert_eq!(next, 10);
+                assert_eq!(next, 25);
             }
-            let sample = plan.sample_rows();
-            assert!(sample.count() as u64 * plan.row_bytes <= plan.photograph_bytes);
-            assert_eq!(plan.fits_photographs(), sample == CameraRowSet::all(300));
-            assert!(sample.iter().all(|y| y < 300));
-            assert_eq!(
-                sample,
-                super::tests::plan(megabytes, 1).unwrap().sample_rows()
+            assert_eq!(plan.fits_photographs(), megabytes == 4000);
+        }
+    }
+
+    #[test]
+    fn what_is_read_does_not_depend_on_the_limit() {
+        let least = min_megabytes(CAMERA);
+        let (low, high) = (
+            plan(least, CAMERA, 2).unwrap(),
+            plan(least + 99, CAMERA, 8).unwrap(),
+        );
+        assert!(!high.fits_photographs());
+        assert_eq!(low.sample, high.sample);
+        assert!(2 * low.sample.count() < CAMERA.area());
+        assert_eq!(low.gray_code_rows, high.gray_code_rows);
+        // A small picture is prepared from all of it.
+        let small = Extent::new(500, 300);
+        assert!(
+            plan(min_megabytes(small), small, 2)
+                .unwrap()
+                .fits_photographs()
+        );
+    }
+
+    #[test]
+    fn gray_code_is_decoded_in_rows_over_the_whole_picture() {
+        for (camera, expected) in [([500, 300], 300), ([1024, 1024], 1024), ([4096, 3000], 250)] {
+            let camera = Extent::new(camera[0], camera[1]);
+            let rows = gray_code_rows(camera);
+            assert_eq!(rows.count(), expected);
+            let interval = camera.height / expected as u32;
+            assert!(
+                rows.iter()
+                    .eq((0..camera.height).step_by(interval as usize))
             );
         }
-        assert!(plan(4000, 2).unwrap().fits_photographs());
-        // All rows if they fit, and never more than fit.
-        for photographs in [12, 44, 2000] {
-            let plan = plan(4000, 2).unwrap();
-            let rows = plan.gray_code_rows(photographs).count() as u64;
-            let bytes = rows * 500 * photographs as u64 * PIXEL_BYTES;
-            assert!(bytes < 4000 << 20);
-            assert!(rows == 300 || photographs == 2000);
-        }
-        assert!(!plan(190, 2).unwrap().fits_photographs());
     }
 
     #[test]
     fn too_little_memory_is_refused_with_the_minimum() {
-        let TooLittleMemory { limit, min } = plan(30, 2).unwrap_err();
-        assert_eq!(limit, 30 << 20);
-        let min = min.div_ceil(1 << 20);
-        assert!(plan(min, 2).is_ok());
-        assert!(plan(min - 1, 2).is_err());
+        for camera in [CAMERA, Extent::new(500, 300)] {
+            let min = min_megabytes(camera);
+            assert!(plan(min, camera, 2).is_ok());
+            assert!(plan(min - 1, camera, 2).is_err());
+        }
     }
 }

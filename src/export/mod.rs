@@ -6,6 +6,7 @@
 
 mod capture_remedy;
 mod encoding;
+#[cfg(not(target_arch = "wasm32"))]
 mod memory_plan;
 mod metadata;
 mod preparation;
@@ -14,7 +15,8 @@ mod tile_record;
 
 pub use capture_remedy::capture_remedy;
 pub use encoding::{FileQuality, encode_file, file_geometry, file_tile};
-pub use memory_plan::{MemoryPlan, TooLittleMemory, spread_tile_rows};
+#[cfg(not(target_arch = "wasm32"))]
+pub use memory_plan::{CaptureSize, MemoryPlan, TooLittleMemory};
 pub use metadata::{Provenance, metadata};
 pub use preparation::{
     ExportSettings, MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation,

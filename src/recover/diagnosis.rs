@@ -6,6 +6,7 @@
 //! the blob is crude, but a photograph correlates with its own pattern far better than with any other.
 
 use super::mean_function;
+use super::photometry;
 use super::preparation_input;
 use crate::capture::Measurements;
 use crate::job_executor::{Cancelled, Executor};
@@ -29,6 +30,8 @@ const MIN_AFFECTED: usize = 3;
 const MAX_SLIP: isize = 3;
 /// Largest move in camera pixels along each axis.
 const MAX_MOVE: i32 = 8;
+/// Pixels so near to the sampled ones are loaded, too.
+const _: () = assert!(MAX_MOVE as u32 <= photometry::HALO);
 /// Radius of the blob in light elements, and its standard deviation.
 const BLOB_RADIUS: i32 = 3;
 const BLOB_SIGMA: f64 = 1.2;
@@ -105,7 +108,7 @@ pub fn diagnose(
     if used.len() < MIN_PHOTOGRAPHS || preparation_input::geometry(measurements, window).is_err() {
         return Ok(None);
     }
-    let squares = mean_function::sample_squares(measurements);
+    let squares = mean_function::sample_squares(measurements.camera);
     let pixels = squares.into_iter().flat_map(|square| square.pixels());
     let search = Search {
         measurements,

@@ -18,7 +18,7 @@ use crate::capture::{Pattern, group_count};
 use crate::job_executor::Executor;
 use crate::recover::photometry::CalibratedMeasurements;
 use crate::transport::{
-    Basis, CHANNELS, Decibels, FloatTile, Geometry, TileRect, TileTransportFunctions,
+    Basis, CHANNELS, Decibels, Extent, FloatTile, Geometry, TileRect, TileTransportFunctions,
 };
 
 /// Squares of the picture that are validated: at most half of them, as validation takes as long for each as its recovery,
@@ -31,6 +31,13 @@ const SQUARE_SIDE: u32 = 8;
 const MIN_HELD_OUT: usize = 2;
 /// Smallest error that is distinguishable from noise, as a share of the noise, whose variance is known to a few percent.
 const ERROR_RESOLUTION: f64 = 0.1;
+
+/// The squares of the picture that are validated.
+pub(super) fn sample_squares(camera: Extent) -> Vec<TileRect> {
+    let squares = |max| sampling::spread_squares(camera, SQUARE_SIDE, max);
+    let half = squares(2 * MAX_SQUARES).len() / 2;
+    squares(half.max(MIN_SQUARES))
+}
 
 /// Squares of the picture, recovered from the training patterns, with their measurements under the held-out ones.
 #[derive(Clone, Debug)]
@@ -77,9 +84,7 @@ impl HoldoutValidation {
         if group_count(&pattern_ids(&held_out)) < MIN_HELD_OUT {
             return Ok(None);
         }
-        let squares = |max| sampling::spread_squares(measurements, SQUARE_SIDE, max);
-        let half = squares(2 * MAX_SQUARES).len() / 2;
-        let rects = squares(half.max(MIN_SQUARES));
+        let rects = sample_squares(measurements.camera);
         let samples = |i: usize| prediction::samples(measurements, &split.held_out, rects[i]);
         let samples = executor.map(rects.len(), samples);
         let own = executor.own_jobs(rects.len());

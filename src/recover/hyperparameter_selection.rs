@@ -11,9 +11,10 @@ use super::common_mode_weight::CommonModeWeight;
 use super::error::RecoverError;
 use super::gram_cache::WindowEquations;
 use super::holdout_split::HoldoutSplit;
+use super::holdout_validation;
 use super::pixelwise::{PixelSamples, PixelsByWindow, PixelwiseMethod, PixelwiseRecovery};
 use super::preparation_input::RecoveryPreparationInput;
-use super::sampling::{self, MIN_PATTERNS};
+use super::sampling::{self, MAX_SMALL_PICTURE, MIN_PATTERNS};
 use crate::job_executor::{Cancelled, Executor};
 use crate::linalg::ascending_order;
 use crate::recover::photometry::CalibratedMeasurements;
@@ -30,7 +31,7 @@ impl PixelwiseRecovery {
     /// Non-negative least squares, with the best weight of the common mode.
     ///
     /// # Errors
-    /// If no pixel in memory sees the light plane, and if the executor is cancelled.
+    /// If no sampled pixel sees the light plane, and if the executor is cancelled.
     pub async fn least_squares(
         preparation: &RecoveryPreparationInput<'_, impl Executor>,
     ) -> Result<Self, RecoverError> {
@@ -47,7 +48,7 @@ impl PixelwiseRecovery {
     /// Basis pursuit denoising, with the best weight of the common mode and the best tolerance.
     ///
     /// # Errors
-    /// If no pixel in memory sees the light plane, and if the executor is cancelled.
+    /// If no sampled pixel sees the light plane, and if the executor is cancelled.
     pub async fn denoising(
         preparation: &RecoveryPreparationInput<'_, impl Executor>,
         basis: SparsityBasis,
@@ -118,16 +119,19 @@ impl PixelwiseRecovery {
 /// More than the columns of a light plane, to order its elements row by row.
 const ROW_STRIDE: f64 = (1u64 << 32) as f64;
 
-/// Windows spread over the picture, with some of their pixels.
+/// Windows spread over the picture, with some of their pixels; of a large picture, over the squares that are validated.
 fn sample_windows(
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
     [max_windows, max_pixels]: [usize; 2],
 ) -> Result<Vec<PixelsByWindow>, RecoverError> {
     let geometry = &preparation.geometry;
     let mut windows: Vec<PixelsByWindow> = Vec::new();
-    let is_covered = |&tile: &TileRect| preparation.measurements.has_tile(tile);
-    for tile in geometry.tiles().filter(is_covered) {
-        for (origin, mut pixels) in sampling::pixels_by_window(geometry, tile) {
+    let squares: Vec<TileRect> = match geometry.camera.area() <= MAX_SMALL_PICTURE {
+        true => geometry.tiles().collect(),
+        false => holdout_validation::sample_squares(geometry.camera),
+    };
+    for square in squares {
+        for (origin, mut pixels) in sampling::pixels_by_window(geometry, square) {
             if !geometry.clip_window(origin).is_empty() {
                 pixels.truncate(max_pixels);
                 windows.push((origin, pixels));
@@ -137,7 +141,7 @@ fn sample_windows(
     if windows.is_empty() {
         return Err(RecoverError::CorrespondenceOffLightPlane);
     }
-    // Windows across the border of tiles are in the list of each.
+    // Windows across the border of squares are in the list of each.
     let position =
         |(origin, _): &PixelsByWindow| f64::from(origin.v) * ROW_STRIDE + f64::from(origin.u);
     let order = ascending_order(windows.iter().map(position));

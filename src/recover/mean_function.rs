@@ -14,10 +14,9 @@ use super::normal_equations::{EquationWeights, NormalEquations, WeightedColumns}
 use super::photometry::CalibratedMeasurements;
 use super::preparation_input::RecoveryPreparationInput;
 use super::sampling::{self, PixelsSharingWindow};
-use crate::capture::Measurements;
 use crate::job_executor::{Cancelled, Executor, PARTS};
 use crate::linalg::{self, add_scaled, vectorise};
-use crate::transport::{CHANNELS, LightElement, TileRect, Window};
+use crate::transport::{CHANNELS, Extent, LightElement, TileRect, Window};
 
 /// Rounds of brightness and function. A brightness that is a few per cent off, as it is while the function is unknown,
 /// shows as light from far off.
@@ -42,8 +41,9 @@ pub(super) fn max_bytes(window: Window) -> usize {
     (2 * PARTS + 2) * window.area() * window.area() * size_of::<f64>()
 }
 
-pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
-    sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES)
+/// The squares of the picture that are used.
+pub(super) fn sample_squares(camera: Extent) -> Vec<TileRect> {
+    sampling::spread_squares(camera, SQUARE_SIDE, MAX_SQUARES)
 }
 
 /// Returns the mean light transport function, `[slot]`, non-negative and of sum 1.
@@ -53,7 +53,7 @@ pub(super) fn sample_squares(measurements: &Measurements) -> Vec<TileRect> {
 pub(super) async fn mean_function(
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
 ) -> Result<Vec<f64>, RecoverError> {
-    let squares = sample_squares(preparation.measurements);
+    let squares = sample_squares(preparation.measurements.camera);
     let area = preparation.geometry.window.area();
     let mut mean = vec![1.0 / area as f64; area];
     let sample: Vec<_> = squares.iter().step_by(EARLY_SAMPLING).copied().collect();

@@ -56,7 +56,7 @@ impl Method {
         // Learned tiles may be blended with least squares.
         let learned = self.if_learned(learned::tile_bytes(window));
         let solver = learned.max(PixelwiseRecovery::max_tile_bytes(window, patterns));
-        solver + photometry::max_tile_bytes(patterns, self.if_learned(learned::MAX_HALO))
+        solver + photometry::max_tile_bytes(patterns, self.max_solver_halo())
     }
 
     /// Upper bound on the memory that resampled samples of so many photographs take while a recovery is prepared, in bytes.
@@ -71,7 +71,12 @@ impl Method {
 
     /// Largest distance from a tile, in camera pixels, of measurements that the tile depends on.
     pub fn max_halo(self) -> u32 {
-        self.if_learned(learned::MAX_HALO) + photometry::HALO
+        self.max_solver_halo() + photometry::HALO
+    }
+
+    /// The same of photographs that are not shifted.
+    pub(super) fn max_solver_halo(self) -> u32 {
+        self.if_learned(learned::MAX_HALO)
     }
 
     /// The basis of [`Bpdn`](Self::Bpdn).

@@ -33,6 +33,8 @@ mod photometry;
 mod pixelwise;
 mod prediction;
 mod preparation_input;
+#[cfg(not(target_arch = "wasm32"))]
+mod preparation_pixels;
 mod prepared_recovery;
 mod sampling;
 #[cfg(all(test, not(target_arch = "wasm32")))]
@@ -49,6 +51,8 @@ pub use nnls::Nnls;
 pub use photometry::{
     Flicker, FloodShortfall, MOVED_CODE, PhotographCorrection, PhotographFault, ResponseHypothesis,
 };
+#[cfg(not(target_arch = "wasm32"))]
+pub use preparation_pixels::preparation_pixels;
 pub use prepared_recovery::{PreparedRecovery, RecoverySettings, find_response};
 pub use sampling::MIN_PATTERNS;
 pub use window_size::{TailEstimate, WindowSizeEstimate};

@@ -38,7 +38,7 @@ pub(super) async fn check_patterns(
     preparation: &RecoveryPreparationInput<'_, impl Executor>,
     mean_function: &[f64],
 ) -> Result<(), RecoverError> {
-    let squares = mean_function::sample_squares(preparation.measurements);
+    let squares = mean_function::sample_squares(preparation.measurements.camera);
     if squares.len() < MIN_SQUARES {
         return Ok(());
     }

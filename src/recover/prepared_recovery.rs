@@ -87,8 +87,8 @@ enum TileSolver {
 }
 
 impl PreparedRecovery {
-    /// Learns and chooses from `measurements` what the method needs. They may hold strips of the picture instead of all
-    /// of it; only [covered](Measurements::has_tile) tiles are then used.
+    /// Learns and chooses from `measurements` what the method needs. Of large pictures, only some pixels have to be loaded:
+    /// the same that [`preparation_pixels`](super::preparation_pixels) lists are used in any case.
     ///
     /// # Errors
     /// If there are too few patterns, if the geometry is out of range or no pixel sees the light plane, if the
@@ -276,12 +276,12 @@ impl PreparedRecovery {
         }
     }
 
-    /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other rows of the same
+    /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other pixels of the same
     /// capture: they cover the tile and [`halo`](Self::halo) rows around it, within the picture.
     pub fn tile(&self, measurements: &Measurements, rect: TileRect) -> FloatTile {
         let used = &self.split.all;
         let input = (self.photometry).resampling_input(measurements, &self.geometry, used);
-        let region = sampling::with_margin(measurements, rect, self.solver_halo());
+        let region = sampling::with_margin(measurements.camera, rect, self.solver_halo());
         let resampled = ResampledPhotographs::of_region(input, region);
         let measurements = &input.calibrated(resampled.as_ref());
         match &self.solver {

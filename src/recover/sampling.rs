@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use super::photometry::CalibratedMeasurements;
-use crate::capture::Measurements;
 use crate::transport::{CameraPixel, Extent, Geometry, LightElement, TileRect};
 
 /// Fewest patterns that recovery makes sense with.
@@ -12,46 +11,29 @@ pub const MIN_PATTERNS: usize = 4;
 /// Pixels that share a window, each with its position in a region, row by row.
 pub(super) type PixelsSharingWindow = [(usize, CameraPixel)];
 
-/// Squares of `side²` pixels spread evenly over the picture, without overlap, at most `max_count`. Only squares whose
-/// measurements are in memory.
-pub(super) fn spread_squares(
-    measurements: &Measurements,
-    side: u32,
-    max_count: usize,
-) -> Vec<TileRect> {
-    let is_covered = |square| measurements.has_tile(square);
-    spread_over(measurements.camera, side, max_count, is_covered)
-}
+/// Most pixels of a picture that is small enough to choose a sample from all of it.
+pub(super) const MAX_SMALL_PICTURE: usize = 1 << 19;
 
-fn spread_over(
-    camera: Extent,
-    side: u32,
-    max_count: usize,
-    is_covered: impl Fn(TileRect) -> bool,
-) -> Vec<TileRect> {
+/// Squares of `side²` pixels spread evenly over the picture, without overlap, at most `max_count`. They do not depend on
+/// what is loaded of the picture: [`preparation_pixels`](super::preparation_pixels) lists what has to be.
+pub(super) fn spread_squares(camera: Extent, side: u32, max_count: usize) -> Vec<TileRect> {
     let extent = Extent::new(side.min(camera.width), side.min(camera.height));
-    let square = |column: u32, row: u32| TileRect {
+    let square = |(column, row): (u32, u32)| TileRect {
         x: column * extent.width,
         y: row * extent.height,
         extent,
     };
-    let columns = camera.width / extent.width;
-    let rows: Vec<u32> = (0..camera.height / extent.height)
-        .filter(|&row| is_covered(square(0, row)))
-        .collect();
-    if columns as usize * rows.len() <= max_count {
-        let squares = |&row: &u32| (0..columns).map(move |column| square(column, row));
-        return rows.iter().flat_map(squares).collect();
+    let grid = Extent::new(camera.width / extent.width, camera.height / extent.height);
+    if grid.area() <= max_count {
+        return grid.cells().map(square).collect();
     }
     let mut squares: Vec<TileRect> = Vec::with_capacity(max_count);
     // Roberts's R2 sequence: even, and in step with no periodic structure of the picture.
     for i in 1..=64 * max_count {
         let position =
-            |step: f64, cells: usize| ((0.5 + step * i as f64).fract() * cells as f64) as usize;
-        let square = square(
-            position(0.754_877_666_246_69, columns as usize) as u32,
-            rows[position(0.569_840_290_998_05, rows.len())],
-        );
+            |step: f64, cells: u32| ((0.5 + step * i as f64).fract() * f64::from(cells)) as u32;
+        let column = position(0.754_877_666_246_69, grid.width);
+        let square = square((column, position(0.569_840_290_998_05, grid.height)));
         if !squares.contains(&square) {
             squares.push(square);
             if squares.len() == max_count {
@@ -93,21 +75,16 @@ pub(super) fn pixels_by_origin(
     windows
 }
 
-/// `rect` with a border of `margin` pixels, where the picture has such pixels and their measurements are loaded.
-pub(super) fn with_margin(measurements: &Measurements, rect: TileRect, margin: u32) -> TileRect {
-    let camera = measurements.camera;
-    let (right, bottom) = (rect.x + rect.extent.width, rect.y + rect.extent.height);
-    let is_loaded = |y: &u32| measurements.rows.index_of(*y).is_some();
-    let x = rect.x.saturating_sub(margin);
-    let above = (1..=margin.min(rect.y)).take_while(|d| is_loaded(&(rect.y - d)));
-    let y = rect.y - above.count() as u32;
-    let below = (bottom..camera.height.min(bottom + margin)).take_while(is_loaded);
+/// `rect` with a border of `margin` pixels, where the picture has such pixels.
+pub(super) fn with_margin(camera: Extent, rect: TileRect, margin: u32) -> TileRect {
+    let (x, y) = (rect.x.saturating_sub(margin), rect.y.saturating_sub(margin));
+    let end = |start: u32, length: u32, side: u32| (start + length + margin).min(side);
     TileRect {
         x,
         y,
         extent: Extent::new(
-            (right + margin).min(camera.width) - x,
-            bottom + below.count() as u32 - y,
+            end(rect.x, rect.extent.width, camera.width) - x,
+            end(rect.y, rect.extent.height, camera.height) - y,
         ),
     }
 }
@@ -166,7 +143,7 @@ mod tests {
 
     #[test]
     fn squares_are_spread_without_overlap() {
-        let squares = spread_over(extent(128, 96), 16, 24, |_| true);
+        let squares = spread_squares(extent(128, 96), 16, 24);
         assert_eq!(squares.len(), 24);
         for (i, a) in squares.iter().enumerate() {
             assert!(a.x + 16 <= 128 && a.y + 16 <= 96);
@@ -174,6 +151,6 @@ mod tests {
                 assert!(a.x.abs_diff(b.x) >= 16 || a.y.abs_diff(b.y) >= 16);
             }
         }
-        assert_eq!(spread_over(extent(3, 5), 16, 24, |_| true).len(), 1);
+        assert_eq!(spread_squares(extent(3, 5), 16, 24).len(), 1);
     }
 }

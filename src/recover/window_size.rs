@@ -21,7 +21,7 @@ use super::sampling::{self, PixelsSharingWindow};
 use crate::capture::{Measurements, group_count};
 use crate::job_executor::{Executor, PARTS, set_values, share_of_jobs, values};
 use crate::linalg::{self, add_scaled, ascending_order, vectorise};
-use crate::transport::{CameraPixel, Geometry, LightElement, TileRect, Window};
+use crate::transport::{CameraPixel, Extent, Geometry, LightElement, TileRect, Window};
 
 /// Side of the widest window that is searched.
 const MAX_SIDE: u32 = 31;
@@ -38,6 +38,11 @@ const MARGIN_RINGS: usize = 1;
 /// Squares of the picture that are used, and their side in camera pixels.
 const MAX_SQUARES: usize = 1024;
 const SQUARE_SIDE: u32 = 4;
+
+/// The squares of the picture that are used.
+pub(super) fn sample_squares(camera: Extent) -> Vec<TileRect> {
+    sampling::spread_squares(camera, SQUARE_SIDE, MAX_SQUARES)
+}
 
 /// A window for the recovery, as estimated from measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +74,7 @@ impl WindowSizeEstimate {
         Err(_) => panic!("the widest window is a window"),
     };
 
-    /// Estimates the window from the rows of `measurements` that are in memory.
+    /// Estimates the window.
     ///
     /// # Errors
     /// If the geometry is out of range, if no pixel sees the light plane, and if the executor is cancelled.
@@ -81,7 +86,7 @@ impl WindowSizeEstimate {
         let max_side = MAX_SIDE.min((light.width.min(light.height) / 2).saturating_sub(1) | 1);
         let geometry = preparation_input::geometry(measurements, Window::new(max_side)?)?;
         let rings = WindowRings::new(max_side, group_count(&pattern_ids(&measurements.patterns)));
-        let squares = sampling::spread_squares(measurements, SQUARE_SIDE, MAX_SQUARES);
+        let squares = sample_squares(measurements.camera);
         // Errors of neighbouring squares are correlated: each part is a strip of the picture.
         let position = |&TileRect { x, y, .. }: &TileRect| {
             measurements.camera.index(CameraPixel { x, y }) as f64

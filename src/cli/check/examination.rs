@@ -77,7 +77,7 @@ impl<'a> Examination<'a> {
             photographs: sample.shots.len(),
             camera: [camera.width, camera.height],
             light: [light.width, light.height],
-            rows: self.scanned.shot_rows().count(),
+            pixels: self.scanned.shot_pixels().count(),
             window: window.map(Window::side),
             expected_snr_db: prepared.as_ref().and_then(PreparedExport::expected_snr),
             noise: sample.measurements.noise,
@@ -140,16 +140,16 @@ impl<'a> Examination<'a> {
     }
 
     fn add_pixels_and_noise(&self, sample: &CaptureSample<()>, findings: &mut Findings) {
-        let (rows, height) = (
-            self.scanned.shot_rows().count(),
-            sample.measurements.camera.height,
+        let (pixels, area) = (
+            self.scanned.shot_pixels().count(),
+            sample.measurements.camera.area(),
         );
         let notes = messages::defective_pixels(sample.read.defects).into_iter();
-        findings.add(notes.map(|note| match rows == height as usize {
+        findings.add(notes.map(|note| match pixels == area {
             true => note,
             false => Finding {
                 message: format!(
-                    "{}, in the {rows} of {height} rows that were examined",
+                    "{}, in the {pixels} of {area} camera pixels that were examined",
                     note.message
                 ),
                 ..note

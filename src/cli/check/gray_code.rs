@@ -90,7 +90,7 @@ fn collect(
             return LinearPhoto::new();
         };
         match scanned.scan(PhotographRole::GrayCode(i)) {
-            Some(scan) => manifest.camera.measure(&scan.rows, 1.0, &dark).collect(),
+            Some(scan) => manifest.camera.measure(&scan.pixels, 1.0, &dark).collect(),
             None => {
                 *is_whole.borrow_mut() = false;
                 LinearPhoto::new()

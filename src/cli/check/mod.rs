@@ -2,7 +2,7 @@
 //!
 //! Every photograph is decoded once ([`scanned_capture`]). Files ([`file_findings`]), single photographs
 //! ([`photograph_findings`]) and the Gray code ([`gray_code`]) are looked at first. What photographs say together is found
-//! by the preparation of a recovery, as `recover` runs it, from the rows that are in memory ([`examination`]).
+//! by the preparation of a recovery, as `recover` runs it, from the pixels that are in memory ([`examination`]).
 
 mod examination;
 mod file_findings;
@@ -161,10 +161,11 @@ impl<'a> CheckedPhotographs<'a> {
     /// Decodes all photographs, and looks at each by itself.
     fn read(
         folder: &CaptureFolder,
+        window: Option<Window>,
         cores: &'a InterruptibleCores,
         findings: &mut Findings,
     ) -> Result<Self, Cancelled> {
-        let (mut scanned, errors) = ScannedCapture::read(folder, cores)?;
+        let (mut scanned, errors) = ScannedCapture::read(folder, window, cores)?;
         let of_photograph = |(role, error)| FileFault::of_photograph(folder, role, error);
         let mut faults: Vec<FileFault> = errors.into_iter().map(of_photograph).collect();
         faults.extend(pattern_faults(folder));
@@ -207,7 +208,7 @@ fn check_photographs(
     cores: &InterruptibleCores,
 ) -> Result<CheckReport> {
     let mut findings = Findings::default();
-    let photographs = CheckedPhotographs::read(folder, cores, &mut findings)?;
+    let photographs = CheckedPhotographs::read(folder, args.window, cores, &mut findings)?;
     let mut shot_reports = photographs.shot_reports(folder);
     let examined = match photographs.usable.len() {
         usable if usable < MIN_PATTERNS => {

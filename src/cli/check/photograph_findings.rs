@@ -283,7 +283,7 @@ fn median_light(brightness: &[Option<Brightness>]) -> f64 {
     }
 }
 
-/// Samples of a photograph that are spread over the rows that were kept: at exposure 1, less the dark frame, and white where
+/// Samples of a photograph that are spread over the pixels that were kept: at exposure 1, less the dark frame, and white where
 /// saturated.
 fn samples(
     camera: &ManifestCamera,
@@ -291,7 +291,7 @@ fn samples(
     exposure: f64,
     dark: &[[f32; CHANNELS]],
 ) -> Vec<f64> {
-    let pixels = every(&scan.rows).zip(every(dark));
+    let pixels = every(&scan.pixels).zip(every(dark));
     let measured = pixels.flat_map(|(codes, dark)| {
         camera.measure(
             std::slice::from_ref(codes),

@@ -39,16 +39,16 @@ pub struct ExaminedCapture {
     pub photographs: usize,
     pub camera: [u32; 2],
     pub light: [u32; 2],
-    /// Number of camera rows from which the capture was examined as a whole.
-    pub rows: usize,
+    /// Number of camera pixels from which the capture was examined as a whole.
+    pub pixels: usize,
     pub window: Option<u32>,
-    /// SNR of the transport as the check recovers it from these rows, estimated on held-out patterns.
+    /// SNR of the transport as the check recovers it from these pixels, estimated on held-out patterns.
     pub expected_snr_db: Option<Decibels>,
     pub noise: NoiseModel,
     /// Along columns and rows of the light plane; null without Gray code that can be read.
     pub gray_code: Option<[GrayCodeQuality; 2]>,
     pub saturated_samples: usize,
-    /// In these rows.
+    /// Of these pixels.
     pub hot_pixels: usize,
     pub dead_pixels: usize,
     pub estimated_fields: Vec<EstimatedField>,

@@ -1,32 +1,31 @@
-//! A capture whose photographs are decoded once: the codes of sampled rows stay in memory, so that they can be read by
+//! A capture whose photographs are decoded once: the codes of sampled pixels stay in memory, so that they can be read by
 //! other manifests and in other selections.
 
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 
 use crate::capture::{
-    CameraRowSet, CaptureError, CaptureFolder, LinearPhoto, ListedPhotograph, Manifest,
-    ManifestCamera, NoiseModel, PhotographRole, PhotographScan,
+    CameraPixelSet, CameraRowSet, CaptureError, CaptureFolder, LinearPhoto, ListedPhotograph,
+    Manifest, ManifestCamera, NoiseModel, PhotographRole, PhotographScan,
 };
 use crate::cli::measurement_reader::ReadSample;
 use crate::cli::process_resources::InterruptibleCores;
 use crate::cli::progress;
 use crate::cli::recover::capture_sample::{CaptureSample, PhotographSource};
-use crate::export::spread_tile_rows;
 use crate::job_executor::{Cancelled, Executor};
-use crate::transport::{CHANNELS, Correspondence};
+use crate::recover::{Method, preparation_pixels};
+use crate::transport::{CHANNELS, Correspondence, TileRect, Window};
 
-/// Memory for the sampled rows of the shots, and of the Gray code: of 80 photographs of 24 megapixels two rows of tiles.
-/// With what the preparation takes this stays well below a gigabyte.
-const SAMPLE_BYTES: usize = 560 << 20;
+/// Memory for shots that are loaded whole, and for the sampled rows of the Gray code.
+const WHOLE_SHOTS_BYTES: usize = 560 << 20;
 const GRAY_CODE_BYTES: usize = 128 << 20;
 /// A pixel of a photograph in memory: its codes and its measurements.
 const PIXEL_BYTES: usize = CHANNELS * (size_of::<u16>() + size_of::<f32>());
 
-/// The codes of the sampled rows, and statistics of all.
+/// The codes of the sampled pixels, and statistics of all.
 pub struct ScannedCapture<'a> {
     cores: &'a InterruptibleCores,
-    rows: SampledRows,
+    sampled: SampledPixels,
     dark: Option<PhotographScan>,
     flood: Option<PhotographScan>,
     shots: Vec<Option<PhotographScan>>,
@@ -37,35 +36,39 @@ pub struct ScannedCapture<'a> {
     pub contrasts: Option<[f32; 2]>,
 }
 
-/// The camera rows whose codes are kept.
-struct SampledRows {
-    shots: CameraRowSet,
-    gray_code: CameraRowSet,
+/// The camera pixels whose codes are kept.
+struct SampledPixels {
+    shots: CameraPixelSet,
+    /// Whole rows.
+    gray_code: CameraPixelSet,
     /// Both.
-    dark: CameraRowSet,
+    dark: CameraPixelSet,
 }
 
-impl SampledRows {
-    fn new(manifest: &Manifest) -> Self {
+impl SampledPixels {
+    fn new(manifest: &Manifest, window: Option<Window>) -> Self {
         let camera = manifest.camera.extent();
-        let row = |photographs: usize| (photographs * camera.width as usize * PIXEL_BYTES).max(1);
-        let max_rows = SAMPLE_BYTES / row(manifest.shots.len() + 1);
-        let shots = spread_tile_rows(camera, u32::try_from(max_rows).unwrap_or(u32::MAX));
-        // Rows of Gray code need no neighbours.
-        let max_rows = GRAY_CODE_BYTES / row(manifest.graycode.len());
-        let step = (camera.height as usize).div_ceil(max_rows.max(1));
+        let bytes = |photographs: usize| (photographs * PIXEL_BYTES).max(1);
+        let is_small = camera.area() * bytes(manifest.shots.len() + 1) <= WHOLE_SHOTS_BYTES;
+        let shots = match is_small {
+            true => CameraPixelSet::all(camera),
+            // The fallback reads more than least squares.
+            false => preparation_pixels(camera, Method::Learned, window),
+        };
+        let row_bytes = bytes(manifest.graycode.len()) * camera.width as usize;
+        let max_rows = (GRAY_CODE_BYTES / row_bytes).max(1);
+        let step = (camera.height as usize).div_ceil(max_rows);
         let single = (0..camera.height).step_by(step).map(|y| y..y + 1);
-        let gray_code = CameraRowSet::from_strips(single);
-        let mut strips = [shots.strips(), gray_code.strips()].concat();
-        strips.sort_by_key(|strip| strip.start);
+        let gray_code = CameraPixelSet::of_rows(CameraRowSet::from_strips(single), camera.width);
+        let rects: Vec<TileRect> = shots.rects().chain(gray_code.rects()).collect();
         Self {
-            dark: CameraRowSet::from_strips(strips),
+            dark: CameraPixelSet::union(camera, &rects),
             shots,
             gray_code,
         }
     }
 
-    fn of(&self, role: PhotographRole) -> &CameraRowSet {
+    fn of(&self, role: PhotographRole) -> &CameraPixelSet {
         match role {
             PhotographRole::Dark => &self.dark,
             PhotographRole::Flood | PhotographRole::Shot(_) => &self.shots,
@@ -75,21 +78,23 @@ impl SampledRows {
 }
 
 impl<'a> ScannedCapture<'a> {
-    /// Decodes all photographs in parallel. Returns those that cannot be read as well.
+    /// Decodes all photographs in parallel, for a recovery in `window`, which is `None` if it is estimated. Returns those that
+    /// cannot be read as well.
     ///
     /// # Errors
     /// [`Cancelled`].
     pub fn read(
         folder: &CaptureFolder,
+        window: Option<Window>,
         cores: &'a InterruptibleCores,
     ) -> Result<(Self, Vec<(PhotographRole, CaptureError)>), Cancelled> {
         let manifest = folder.manifest();
         let listed = manifest.photographs();
-        let rows = SampledRows::new(manifest);
+        let sampled = SampledPixels::new(manifest, window);
         let bar = progress::bar("reading", listed.len());
         let scan = |photograph: &ListedPhotograph<'_>| {
             cores.check_cancelled()?;
-            let scan = folder.scan(*photograph, rows.of(photograph.role));
+            let scan = folder.scan(*photograph, sampled.of(photograph.role));
             bar.inc(1);
             Ok((photograph.role, scan))
         };
@@ -98,7 +103,7 @@ impl<'a> ScannedCapture<'a> {
         drop(bar);
         let mut capture = Self {
             cores,
-            rows,
+            sampled,
             dark: None,
             flood: None,
             shots: vec![None; manifest.shots.len()],
@@ -134,24 +139,25 @@ impl<'a> ScannedCapture<'a> {
         folder.manifest().correspondence.is_some() || self.correspondence.is_some()
     }
 
-    /// The camera rows that are kept of shots.
-    pub fn shot_rows(&self) -> &CameraRowSet {
-        &self.rows.shots
+    /// The camera pixels that are kept of shots.
+    pub fn shot_pixels(&self) -> &CameraPixelSet {
+        &self.sampled.shots
     }
 
     /// The camera rows that are kept of Gray code.
     pub fn gray_code_rows(&self) -> &CameraRowSet {
-        &self.rows.gray_code
+        self.sampled.gray_code.rows()
     }
 
-    /// The dark frame as measurements in the rows that are kept of photographs of this role; zeros if there is none.
+    /// The dark frame as measurements in the pixels that are kept of photographs of this role; zeros if there is none.
     pub fn dark_of(&self, role: PhotographRole, camera: &ManifestCamera) -> LinearPhoto {
-        let (rows, width) = (self.rows.of(role), camera.width as usize);
+        let pixels = self.sampled.of(role);
         let Some(dark) = &self.dark else {
-            return vec![[0.0; CHANNELS]; rows.count() * width];
+            return vec![[0.0; CHANNELS]; pixels.count()];
         };
-        let indices = rows.iter().filter_map(|y| self.rows.dark.index_of(y));
-        let codes = indices.flat_map(|row| &dark.rows[row * width..][..width]);
+        let pixels = pixels.rects().flat_map(TileRect::pixels);
+        let indices = pixels.filter_map(|pixel| self.sampled.dark.index_of(pixel));
+        let codes = indices.map(|n| &dark.pixels[n]);
         let linear = |codes: &[u16; CHANNELS]| codes.map(|code| camera.linear(code, 1.0));
         codes.map(linear).collect()
     }
@@ -172,7 +178,7 @@ impl<'a> ScannedCapture<'a> {
         let correspondence = declared.or(self.correspondence.as_ref()).cloned();
         let correspondence = correspondence.context("the correspondence is unknown")?;
         let measure = |scan: &PhotographScan, exposure: f64| -> LinearPhoto {
-            camera.measure(&scan.rows, exposure, &dark).collect()
+            camera.measure(&scan.pixels, exposure, &dark).collect()
         };
         let scans = shots.iter().map(|&i| self.scan(PhotographRole::Shot(i)));
         let scans = scans.collect::<Option<Vec<_>>>();
@@ -184,12 +190,12 @@ impl<'a> ScannedCapture<'a> {
         let brightness = 1.0 - manifest.light.dimming.unwrap_or(0.0);
         let flood_photo = flood.map(|scan| measure(scan, brightness));
         let mut measurements = folder.empty_measurements(&shots, patterns, correspondence, noise);
-        measurements.rows = self.rows.shots.clone();
+        measurements.loaded = self.sampled.shots.clone();
         measurements.photos = photos;
         measurements.flood = flood_photo;
         let codes = |scan: &PhotographScan| scan.codes.with_saturation(camera.saturated_from());
         let codes_by_shot = scans.iter().map(|scan| codes(scan)).collect();
-        let mut read = ReadSample::of_rows(&mut measurements, codes_by_shot, code);
+        let mut read = ReadSample::new(&mut measurements, codes_by_shot, code);
         read.flood_codes = flood.map(codes);
         Ok(CaptureSample {
             folder,

@@ -10,8 +10,8 @@ use crate::format::HEADER_BYTES;
 use crate::recover::{Method, SparsityBasis};
 use crate::transport::{Decibels, Window};
 
-/// Enough for about ten megapixels under 80 patterns. A constant, not a share of the machine's memory, so that the same
-/// command writes the same bytes on every machine.
+/// Enough for about four megapixels under 80 patterns to be read once. A constant, so that the same command fits, or is
+/// refused, on every machine.
 const DEFAULT_MEMORY: &str = "4G";
 
 /// Recover the light transport of an object from a folder of photographs
@@ -49,7 +49,7 @@ pub struct RecoverArgs {
     /// many for pictures of more than 1024 pixels a side, otherwise 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=12))]
     pub levels: Option<u32>,
-    /// Limit on memory; photographs that do not fit are read in strips
+    /// Limit on memory; photographs that do not fit are read twice, in strips. The file is the same
     #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
     pub memory: ByteCount,
     /// Which responses of display and camera to use where the photographs contradict capture.json

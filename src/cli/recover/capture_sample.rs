@@ -49,14 +49,14 @@ pub trait PhotographSource {
     fn finest_contrasts(&self, sample: &CaptureSample<Self::Dark>) -> Option<[f32; 2]>;
 }
 
-/// Reads photographs as far as they fit in memory.
+/// Reads photographs whole if they fit in memory, otherwise the pixels that the preparation reads.
 #[derive(Clone, Copy)]
 pub struct SampleSource<'a> {
     pub plan: &'a MemoryPlan,
     pub cores: &'a InterruptibleCores,
 }
 
-/// Measurements of the rows that fit in memory, as the manifest says.
+/// Measurements of the pixels that a recovery is prepared from, or of all, as the manifest says.
 pub struct CaptureSample<D = DarkFrame> {
     pub folder: CaptureFolder,
     /// Indices of the shots.
@@ -76,14 +76,13 @@ impl SampleSource<'_> {
     ) -> Result<CaptureSample> {
         let dark = folder.read_dark()?;
         let flood = folder.open_flood(&dark)?;
-        let gray_code_rows = self.plan.gray_code_rows(folder.manifest().graycode.len());
-        let mut measurements = read_patterns(&folder, &dark, &shots, &gray_code_rows)?;
+        let mut measurements = read_patterns(&folder, &dark, &shots, self.plan.gray_code_rows())?;
         let reader = MeasurementReader::open(&folder, &dark, &shots)?;
         opened()?;
-        let rows = self.plan.sample_rows();
-        let mut read = reader.read_sample(&mut measurements, &rows, self.cores)?;
+        let pixels = self.plan.sample();
+        let mut read = reader.read_sample(&mut measurements, pixels, self.cores)?;
         if let Some(flood) = flood {
-            let (samples, codes) = read_sample_of(flood, &rows)?;
+            let (samples, codes) = read_sample_of(flood, pixels)?;
             measurements.flood = Some(samples);
             read.flood_codes = Some(codes);
         }

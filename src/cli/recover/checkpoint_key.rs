@@ -39,8 +39,6 @@ pub struct CheckpointKey {
     pub trust: String,
     /// `--no-register`.
     pub no_register: bool,
-    /// `--memory`, unless all photographs fit in it.
-    pub memory_bytes: Option<u64>,
     /// The files read, by their names in the manifest.
     pub files: BTreeMap<String, FileDigest>,
     /// Number of tiles.
@@ -64,7 +62,6 @@ impl CheckpointKey {
         };
         let files = folder.files(shots).into_par_iter().map(digest);
         let method = args.method();
-        let fits = plan.fits_gray_code(folder.manifest().graycode.len());
         Ok(Self {
             program: PROGRAM.to_owned(),
             method: method.name().to_owned(),
@@ -73,7 +70,6 @@ impl CheckpointKey {
             patterns: args.patterns,
             trust: value_name(args.trust),
             no_register: args.no_register,
-            memory_bytes: (!(plan.fits_photographs() && fits)).then_some(args.memory.0),
             files: files.collect::<Result<_>>()?,
             tiles: plan.tiles(),
         })
@@ -97,7 +93,7 @@ impl CheckpointKey {
     }
 
     /// Names and values of the options.
-    fn options(&self) -> [(&'static str, String); 7] {
+    fn options(&self) -> [(&'static str, String); 6] {
         let text = |value: Option<String>, none: &str| value.unwrap_or_else(|| none.to_owned());
         let number = |value: Option<u64>, none| text(value.map(|value| value.to_string()), none);
         let no_register = if self.no_register {
@@ -105,7 +101,6 @@ impl CheckpointKey {
         } else {
             "not given"
         };
-        let memory = number(self.memory_bytes, "enough for all photographs");
         [
             ("--method", self.method.clone()),
             ("--basis", text(self.basis.clone(), "not given")),
@@ -116,7 +111,6 @@ impl CheckpointKey {
             ),
             ("--trust", self.trust.clone()),
             ("--no-register", no_register.to_owned()),
-            ("--memory", memory),
         ]
     }
 }

@@ -17,7 +17,7 @@ use super::messages;
 use super::origin::{FileOrigin, OriginInput};
 use super::preparation::{CapturePreparation, PreparationSettings, PreparedCapture};
 use super::report::{RecoverReport, photograph_reports};
-use crate::capture::{CaptureFolder, DefectivePixels};
+use crate::capture::{CameraPixelSet, CaptureFolder, DefectivePixels};
 use crate::cli::levels_output::{temporary_spool, write_levels};
 use crate::cli::measurement_reader::MeasurementReader;
 use crate::cli::output_file::{LTM, OutputFile};
@@ -188,7 +188,7 @@ impl RecoverJob<'_> {
         let mut reader = None;
         if !plan.fits_photographs() {
             reader = Some(MeasurementReader::open(&folder, &dark, &shots)?);
-            measurements.clear_rows();
+            measurements.unload();
         }
         let has_saturation = read.codes.saturated > 0;
         let mut overexposed = 0;
@@ -196,11 +196,15 @@ impl RecoverJob<'_> {
             Some(_) => DefectivePixels::default(),
             None => read.defects,
         };
+        let mut next_row = 0;
         for (tile_rows, rows) in plan.strips(recovery.halo()) {
             if let Some(reader) = &mut reader {
                 let check = || Ok(cores.check_cancelled()?);
-                reader.load_rows(&mut measurements, &rows, check)?;
-                defects += reader.fill_defects(&mut measurements, &read.codes);
+                let pixels = CameraPixelSet::row_range(rows.clone(), geometry.camera.width);
+                reader.load(&mut measurements, &pixels, check)?;
+                // Rows that were loaded before are filled already.
+                defects += reader.fill_defects(&mut measurements, next_row, &read.codes);
+                next_row = rows.end;
             }
             let recover_tile = |i: u32| -> Result<usize> {
                 let (i, rect) = (i as usize, geometry.tile(i as usize));

@@ -31,8 +31,8 @@ use super::process_resources::{InterruptibleCores, thread_pool};
 use super::report::print_json;
 use super::value_parsers::UsageError;
 use crate::capture::CaptureFolder;
-use crate::export::{MemoryPlan, select_shots};
-use crate::recover::{MIN_PATTERNS, RecoverError, WindowSizeEstimate};
+use crate::export::{CaptureSize, MemoryPlan, select_shots};
+use crate::recover::{MIN_PATTERNS, RecoverError};
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
     if args.basis.is_some() && args.method().basis().is_none() {
@@ -67,10 +67,17 @@ pub fn recover(
         return Err(RecoverError::TooFewPatterns(shots.len())).context(manifest);
     }
     let method = args.method();
-    let max_window = args.window.unwrap_or(WindowSizeEstimate::MAX_WINDOW);
+    let capture = CaptureSize {
+        camera: manifest.camera.extent(),
+        light: manifest.light.extent(),
+        shots: shots.len(),
+        gray_code: match manifest.correspondence {
+            Some(_) => 0,
+            None => manifest.graycode.len(),
+        },
+    };
     let (limit, threads) = (args.memory.0, rayon::current_num_threads());
-    let extents = (manifest.camera.extent(), manifest.light.extent());
-    let plan = MemoryPlan::new(limit, extents, shots.len(), method, max_window, threads)
+    let plan = MemoryPlan::new(limit, capture, method, args.window, threads)
         .map_err(messages::too_little_memory)?;
     let levels = levels_of(args.levels, manifest.camera.extent());
     let levels = levels.with_context(|| folder.manifest_path().display().to_string())?;

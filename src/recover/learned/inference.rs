@@ -58,7 +58,7 @@ impl LearnedModel {
         pattern_indices: &[usize],
         rect: TileRect,
     ) -> ObservationEquations {
-        let region = with_margin(measurements, rect, self.halo());
+        let region = with_margin(measurements.camera, rect, self.halo());
         let (geometry, basis) = (&self.geometry, &self.basis);
         ObservationEquations::new(measurements, geometry, basis, pattern_indices, region)
     }

@@ -22,7 +22,7 @@ use crate::recover::error::RecoverError;
 use crate::recover::mean_function;
 use crate::recover::preparation_input::RecoveryPreparationInput;
 use crate::recover::sampling::{spread_squares, with_margin};
-use crate::transport::{TileRect, Window};
+use crate::transport::{Extent, TileRect, Window};
 
 /// Ranks to choose from; each fills vector registers together with the mean function.
 const CANDIDATE_RANKS: [usize; 3] = [23, 31, 47];
@@ -61,6 +61,12 @@ pub(in crate::recover) fn preparation_bytes(window: Window) -> usize {
     squares.max(2 * MAX_GRAM_BYTES)
 }
 
+/// As many training regions as there may be, without the border that holds their outer neighbours. Where there are fewer,
+/// each is one of these.
+pub(in crate::recover) fn sample_regions(camera: Extent) -> Vec<TileRect> {
+    spread_squares(camera, REGION_SIDE_PX, MAX_REGIONS)
+}
+
 impl<E: Executor> RecoveryPreparationInput<'_, E> {
     /// Learns the basis and the pixel prior over it, starting from the mean function, `[S]`.
     ///
@@ -74,7 +80,7 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
         let mean = mean_function::smooth(mean_function, side);
         let (functions, mut prior) = initial_prior(&mean, side, self.executor);
         let basis = LearnedBasis::new(&functions, &mean);
-        let squares = mean_function::sample_squares(self.measurements);
+        let squares = mean_function::sample_squares(self.measurements.camera);
         let training = TrainingEquations::new(self, squares.len(), |i| {
             self.equations(&basis, &self.split.training, squares[i])
         });
@@ -124,7 +130,8 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
     /// # Errors
     /// [`Cancelled`].
     pub(super) async fn training_regions(&self, rank: usize) -> Result<Vec<TileRect>, Cancelled> {
-        let regions = spread_squares(self.measurements, REGION_SIDE_PX, MAX_REGIONS);
+        let camera = self.measurements.camera;
+        let regions = sample_regions(camera);
         let count = |i: usize| {
             let (all, rect) = (&self.split.all, self.with_neighbours(regions[i]));
             let (measurements, geometry) = (self.measurements, &self.geometry);
@@ -139,7 +146,7 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
         }
         let fit = MAX_GRAM_BYTES / (bytes / regions.len()).max(1);
         let count = fit.max(MIN_REGIONS);
-        Ok(spread_squares(self.measurements, REGION_SIDE_PX, count))
+        Ok(spread_squares(camera, REGION_SIDE_PX, count))
     }
 
     /// Continues EM of the pixel prior by `em_iterations` on `regions` from the patterns `pattern_indices`, and learns
@@ -209,6 +216,6 @@ impl<E: Executor> RecoveryPreparationInput<'_, E> {
     }
 
     fn with_neighbours(&self, rect: TileRect) -> TileRect {
-        with_margin(self.measurements, rect, NEIGHBOURHOOD_RADIUS)
+        with_margin(self.measurements.camera, rect, NEIGHBOURHOOD_RADIUS)
     }
 }

@@ -26,7 +26,7 @@ const GAUGE_WEIGHT: f64 = 1e3;
 /// from the mean function differs between parts of an object.
 const MIN_DEVIATION: f64 = 0.1;
 /// Distance, in camera pixels, of the samples whose difference is a gradient.
-const GRADIENT_MARGIN: u32 = 1;
+pub(in crate::recover) const GRADIENT_MARGIN: u32 = 1;
 /// Ridge relative to the equations' diagonal: a dark photograph has no equations of its own.
 const RIDGE: f64 = 1e-8;
 
@@ -73,7 +73,7 @@ pub(super) async fn fit(
         for square in &squares[share_of_jobs(squares.len(), part, PARTS)] {
             sums.scores
                 .resize(sums.scores.len() + unknowns(patterns), 0.0);
-            let region = sampling::with_margin(input.measurements, *square, GRADIENT_MARGIN);
+            let region = sampling::with_margin(input.measurements.camera, *square, GRADIENT_MARGIN);
             let resampled = match &picture {
                 Some(_) => None,
                 None => ResampledPhotographs::of_region(input, region),

@@ -75,7 +75,7 @@ pub(in crate::recover) async fn estimate(
 ) -> Result<Photometry, Cancelled> {
     let measurements = preparation.measurements;
     let count = measurements.patterns.len();
-    let squares = mean_function::sample_squares(measurements);
+    let squares = mean_function::sample_squares(measurements.camera);
     if squares.len() < MIN_SQUARES || !(MIN_PHOTOGRAPHS..=MAX_PHOTOGRAPHS).contains(&count) {
         return Ok(Photometry::default());
     }

@@ -45,7 +45,7 @@ pub(in crate::recover) fn find(
     if input.mean_function.is_empty() || bands < MIN_BANDS {
         return None;
     }
-    let squares = mean_function::sample_squares(measurements);
+    let squares = mean_function::sample_squares(measurements.camera);
     let picture = ResampledPhotographs::of_small_picture(input, squares.len());
     let sums_of = |i: usize| square_sums(input, picture.as_ref(), squares[i]);
     let sums = executor.map(squares.len(), sums_of);

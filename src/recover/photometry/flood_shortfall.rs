@@ -47,7 +47,7 @@ pub(in crate::recover) fn find(
     if measurements.flood.is_none() || input.mean_function.is_empty() {
         return None;
     }
-    let squares = mean_function::sample_squares(measurements);
+    let squares = mean_function::sample_squares(measurements.camera);
     let picture = ResampledPhotographs::of_small_picture(input, squares.len());
     let sums = |response| {
         let picture = picture.as_ref();

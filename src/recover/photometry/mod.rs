@@ -30,6 +30,8 @@ mod window_covariance;
 
 pub(super) use calibrated_measurements::CalibratedMeasurements;
 pub use calibrated_measurements::PhotographCorrection;
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) use equations::GRADIENT_MARGIN;
 pub(super) use equations::max_bytes;
 pub(super) use estimate::estimate;
 pub use faults::{MOVED_CODE, PhotographFault};
@@ -37,6 +39,8 @@ pub use flicker::Flicker;
 pub(super) use flicker::find as find_flicker;
 pub use flood_shortfall::FloodShortfall;
 pub(super) use flood_shortfall::find as find_flood_shortfall;
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) use resampling::SMALL_BLOCK_SIDE as BLOCK_SIDE;
 pub(super) use resampling::{
     HALO, ResampledPhotographs, ResamplingInput, max_prepared_bytes, max_tile_bytes,
 };

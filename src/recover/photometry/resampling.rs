@@ -12,7 +12,7 @@ use super::window_covariance::WindowModel;
 use super::{CalibratedMeasurements, PhotographCorrection};
 use crate::capture::Measurements;
 use crate::linalg::{self, vectorise};
-use crate::recover::sampling::{self, PixelsSharingWindow};
+use crate::recover::sampling::{self, MAX_SMALL_PICTURE, PixelsSharingWindow};
 use crate::transport::{CHANNELS, CameraPixel, Extent, Geometry, LightElement, TileRect};
 
 /// Largest shift that is undone, in camera pixels.
@@ -41,7 +41,9 @@ const UNEXPLAINED_VARIANCE: f64 = 1e-4;
 const MAX_PREPARED_PIXELS: usize = 2064 * (SMALL_BLOCK_SIDE * SMALL_BLOCK_SIDE) as usize;
 /// Side of a block in camera pixels: of a picture that may be resampled whole, and of a larger one.
 const BLOCK_SIDE: u32 = Geometry::DEFAULT_TILE_SIDE;
-const SMALL_BLOCK_SIDE: u32 = 8;
+pub(in crate::recover) const SMALL_BLOCK_SIDE: u32 = 8;
+/// All of a small picture is loaded. (Of a larger one, what [`preparation_pixels`](super::super::preparation_pixels) lists.)
+const _: () = assert!(MAX_PREPARED_PIXELS <= MAX_SMALL_PICTURE);
 
 /// Upper bound on the memory that the samples of a picture take while a recovery from so many photographs is prepared, in
 /// bytes.
@@ -104,8 +106,7 @@ impl<'a> ResampledPhotographs<'a> {
 
     /// The whole picture, if resampling it takes less time than `squares` small squares of it, each with its own border.
     pub fn of_small_picture(input: ResamplingInput<'a>, squares: usize) -> Option<Self> {
-        let pixels = input.measurements.rows.count() * input.measurements.camera.width as usize;
-        let is_small = pixels <= squares * MAX_PIXELS_PER_SQUARE;
+        let is_small = input.measurements.camera.area() <= squares * MAX_PIXELS_PER_SQUARE;
         is_small.then(|| Self::of_picture(input)).flatten()
     }
 
@@ -130,9 +131,8 @@ impl<'a> ResampledPhotographs<'a> {
             y: top,
             extent,
         } = self.rect;
-        let is_inside = (left..left + extent.width).contains(&x)
-            && (top..top + extent.height).contains(&y)
-            && self.input.measurements.rows.contains(y);
+        let is_inside =
+            (left..left + extent.width).contains(&x) && (top..top + extent.height).contains(&y);
         if !is_inside {
             return f64::NAN;
         }
@@ -181,7 +181,8 @@ impl<'a> ResamplingInput<'a> {
     /// The corrected samples of a region, `[pixel, L, channel]`; NaN where saturated.
     fn resample(&self, rect: TileRect) -> Vec<f32> {
         let measurements = self.calibrated(None);
-        let with_margin = |margin: u32| sampling::with_margin(self.measurements, rect, margin);
+        let camera = self.measurements.camera;
+        let with_margin = |margin: u32| sampling::with_margin(camera, rect, margin);
         let region = with_margin(HALO);
         let mut corrected = Vec::with_capacity(self.used.len());
         for &l in self.used {

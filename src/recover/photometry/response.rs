@@ -64,7 +64,7 @@ pub(in crate::recover) fn find(
     flood_white: f64,
     executor: &impl Executor,
 ) -> Result<Vec<ResponseHypothesis>, Cancelled> {
-    let squares = mean_function::sample_squares(measurements);
+    let squares = mean_function::sample_squares(measurements.camera);
     let step = squares.len().div_ceil(MAX_SQUARES).max(1);
     let squares: Vec<TileRect> = squares.into_iter().step_by(step).collect();
     if squares.len() < MIN_SQUARES || !(MIN_PHOTOGRAPHS..=MAX_PHOTOGRAPHS).contains(&used.len()) {
