@@ -163,15 +163,19 @@ impl MemoryPlan {
         window: Window,
         rank: usize,
     ) -> Result<usize, TooLittleMemory> {
-        let pixels = self.camera.area() as u64;
-        let value = ENCODED_VALUE_BYTES * (window.area() + rank) as u64;
-        let tile = value * pixels.min(u64::from(FILE_TILE_SIDE).pow(2));
-        let fixed = PROGRAM_BYTES + RATE_CONTROL_BYTES.min(value * pixels);
+        let (fixed, tile) = encoding_bytes(self.camera, window, rank);
         let (limit, min) = (self.limit, fixed + tile);
         match limit < min {
             true => Err(TooLittleMemory { limit, min }),
             false => Ok(self.threads.min(((limit - fixed) / tile) as usize)),
         }
+    }
+
+    /// The lowest limit, in bytes, with which a tile of a file can be encoded: of a picture of this size, with functions of
+    /// `window` and `rank` components.
+    pub fn min_encoding_bytes(camera: Extent, window: Window, rank: usize) -> u64 {
+        let (fixed, tile) = encoding_bytes(camera, window, rank);
+        fixed + tile
     }
 
     /// Number of tiles to recover at once.
@@ -219,6 +223,14 @@ impl MemoryPlan {
         };
         (0..tile_rows).step_by(count as usize).map(strip).collect()
     }
+}
+
+/// Memory of encoding a file, and of each of its tiles, in bytes.
+fn encoding_bytes(camera: Extent, window: Window, rank: usize) -> (u64, u64) {
+    let pixels = camera.area() as u64;
+    let value = ENCODED_VALUE_BYTES * (window.area() + rank) as u64;
+    let tile = value * pixels.min(u64::from(FILE_TILE_SIDE).pow(2));
+    (PROGRAM_BYTES + RATE_CONTROL_BYTES.min(value * pixels), tile)
 }
 
 /// The camera rows of Gray code photographs to decode: all of at most [`MAX_GRAY_CODE_PIXELS`], otherwise so many, evenly

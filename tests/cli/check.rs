@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use crate::common::copy_folder;
+use crate::enlargement::{Enlargement, enlarge_capture};
 use crate::session::{run, succeed};
 
 type Photograph = ImageBuffer<Rgb<u16>, Vec<u16>>;
@@ -529,9 +530,6 @@ fn faults_of_rigs_are_told_by_the_codes_of_recover() {
     finding(&report, "display-sharpness");
 }
 
-/// Camera pixels along a side of an enlarged one.
-const ENLARGEMENT: u32 = 20;
-
 /// Time and memory with 80 shots of 24 megapixels, and 30 other photographs. `CHECK_CAPTURE` names a folder that keeps the
 /// capture.
 #[test]
@@ -573,89 +571,5 @@ fn write_large_capture(small: &Path, large: &Capture) {
         ]
         .concat(),
     );
-    for name in ["patterns", "photos", "graycode"] {
-        fs::create_dir_all(large.path.join(name)).unwrap();
-    }
-    let json = fs::read(small.join("capture.json")).unwrap();
-    let mut manifest: Value = serde_json::from_slice(&json).unwrap();
-    let mut names: Vec<String> = ["dark", "flood"]
-        .map(|key| manifest[key].to_string())
-        .to_vec();
-    for key in ["shots", "graycode"] {
-        let listed = manifest[key].as_array().unwrap().iter();
-        names.extend(listed.map(|shot| shot["photo"].to_string()));
-    }
-    for shot in manifest["shots"].as_array().unwrap() {
-        let name = shot["pattern"].as_str().unwrap();
-        fs::copy(small.join(name), large.path.join(name)).unwrap();
-    }
-    let names: Vec<&str> = names.iter().map(|name| name.trim_matches('"')).collect();
-    let threads = std::thread::available_parallelism().unwrap().get();
-    std::thread::scope(|scope| {
-        for thread in 0..threads {
-            let own = names.iter().enumerate().skip(thread).step_by(threads);
-            scope.spawn(move || {
-                own.for_each(|(i, name)| {
-                    enlarge(&small.join(name), &large.path.join(name), i as u64)
-                });
-            });
-        }
-    });
-    for side in ["width", "height"] {
-        let pixels = manifest["camera"][side].as_u64().unwrap();
-        manifest["camera"][side] = json!(pixels * u64::from(ENLARGEMENT));
-    }
-    for row in 0..2 {
-        for column in 0..2 {
-            let value = &mut manifest["correspondence"]["affine"][row][column];
-            *value = json!(value.as_f64().unwrap() / f64::from(ENLARGEMENT));
-        }
-    }
-    fs::write(large.path.join("capture.json"), manifest.to_string()).unwrap();
-}
-
-/// Enlarges a photograph by linear interpolation, and adds the noise of 40,000 electrons at white.
-fn enlarge(from: &Path, to: &Path, seed: u64) {
-    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-    use image::{ExtendedColorType, ImageEncoder};
-
-    let small: Photograph = image::open(from).unwrap().to_rgb16();
-    let place = |x: u32, side: u32| {
-        let at = (f64::from(x) + 0.5) / f64::from(ENLARGEMENT) - 0.5;
-        let at = at.clamp(0.0, f64::from(side - 1));
-        let first = (at as u32).min(side - 2);
-        (first as usize, (at - f64::from(first)) as f32)
-    };
-    let (width, height) = small.dimensions();
-    let columns: Vec<_> = (0..width * ENLARGEMENT).map(|x| place(x, width)).collect();
-    let codes = small.as_raw();
-    let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    let mut bytes: Vec<u8> = Vec::with_capacity(6 * (width * height * ENLARGEMENT.pow(2)) as usize);
-    for (top, down) in (0..height * ENLARGEMENT).map(|y| place(y, height)) {
-        for &(left, right) in &columns {
-            for c in 0..3 {
-                let code = |x: usize, y: usize| f32::from(codes[(y * width as usize + x) * 3 + c]);
-                let row = |y: usize| code(left, y) + right * (code(left + 1, y) - code(left, y));
-                let value = row(top) + down * (row(top + 1) - row(top));
-                // Four uniform numbers are nearly normal together, of variance 1/3.
-                random ^= random << 13;
-                random ^= random >> 7;
-                random ^= random << 17;
-                let parts = [0, 16, 32, 48].map(|shift| (random >> shift & 0xFFFF) as f32);
-                let normal = (parts.iter().sum::<f32>() / 65_536.0 - 2.0) * 3f32.sqrt();
-                let light = ((value - 512.0) / 59_488.0).max(0.0);
-                let deviation = 59_488.0 * (light / 40_000.0 + 4e-8).sqrt();
-                bytes.extend(((value + deviation * normal).round().max(0.0) as u16).to_ne_bytes());
-            }
-        }
-    }
-    let file = std::io::BufWriter::new(fs::File::create(to).unwrap());
-    PngEncoder::new_with_quality(file, CompressionType::Fast, FilterType::Sub)
-        .write_image(
-            &bytes,
-            width * ENLARGEMENT,
-            height * ENLARGEMENT,
-            ExtendedColorType::Rgb16,
-        )
-        .unwrap();
+    enlarge_capture(small, &large.path, Enlargement::by(20));
 }

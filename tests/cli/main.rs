@@ -8,6 +8,7 @@ mod common;
 mod acquisition;
 mod check;
 mod commands;
+mod enlargement;
 mod import;
 mod levels;
 mod photo_files;

@@ -31,7 +31,7 @@ use super::process_resources::{InterruptibleCores, thread_pool};
 use super::report::print_json;
 use super::value_parsers::UsageError;
 use crate::capture::CaptureFolder;
-use crate::export::{CaptureSize, MemoryPlan, select_shots};
+use crate::export::{CaptureSize, MemoryPlan, TooLittleMemory, select_shots};
 use crate::recover::{MIN_PATTERNS, RecoverError};
 
 pub fn run(args: &RecoverArgs) -> Result<()> {
@@ -77,15 +77,22 @@ pub fn recover(
         },
     };
     let (limit, threads) = (args.memory.0, rayon::current_num_threads());
-    let plan = MemoryPlan::new(limit, capture, method, args.window, threads)
-        .map_err(messages::too_little_memory)?;
     let levels = levels_of(args.levels, manifest.camera.extent());
     let levels = levels.with_context(|| folder.manifest_path().display().to_string())?;
-    if let Some(window) = args.window {
+    // The file of an estimated window may take more.
+    let encoding = args.window.map_or(0, |window| {
         let components = encoded_components(levels, window, method.max_rank(window));
-        let encoders = plan.tiles_encoded_at_once(window, components);
-        encoders.map_err(messages::too_little_memory)?;
-    }
+        MemoryPlan::min_encoding_bytes(capture.camera, window, components)
+    });
+    let plan = MemoryPlan::new(limit, capture, method, args.window, threads);
+    let min = plan.as_ref().map_or_else(|error| error.min, |_| 0);
+    let plan = match plan {
+        Ok(plan) if limit >= encoding => plan,
+        _ => {
+            let min = min.max(encoding);
+            return Err(messages::too_little_memory(TooLittleMemory { limit, min }));
+        }
+    };
     let job = RecoverJob {
         start,
         args,
