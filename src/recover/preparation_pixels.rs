@@ -80,7 +80,8 @@ fn blocks_of(camera: Extent, rect: TileRect) -> TileRect {
     }
 }
 
-#[cfg(all(test, feature = "capture"))]
+#[cfg(feature = "capture")]
+#[cfg(test)]
 mod tests {
     use super::super::test_problems::uniform;
     use super::super::{
@@ -111,7 +112,7 @@ mod tests {
             [0.0, f64::from(LIGHT.height) / f64::from(CAMERA.height), 0.0],
         ]);
         // A function with one peak, whose place and brightness vary over the picture.
-        let mut photos = vec![LinearPhoto::with_capacity(CAMERA.area()); PATTERNS];
+        let mut photos = vec![LinearPhoto::new(); PATTERNS];
         for (x, y) in CAMERA.cells() {
             let place = correspondence.at(CameraPixel { x, y });
             let (fx, fy) = (f64::from(x), f64::from(y));
