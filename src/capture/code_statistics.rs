@@ -1,5 +1,7 @@
 //! What the codes of photographs say of the camera: saturation, declared or not, and codes of 8 bits.
 
+use serde::{Deserialize, Serialize};
+
 use crate::linalg::vectorise;
 use crate::transport::CHANNELS;
 
@@ -14,7 +16,7 @@ const SUMMARY_PIXELS: usize = 16;
 const EIGHT_BIT_FACTORS: [u16; 2] = [257, 256];
 
 /// Counts of the codes of photographs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CodeStatistics {
     /// Number of samples that are saturated as the manifest says.
     pub saturated: usize,

@@ -7,6 +7,8 @@
 
 use std::ops::{AddAssign, Range};
 
+use serde::{Deserialize, Serialize};
+
 use super::measurements::Measurements;
 use crate::transport::CHANNELS;
 
@@ -26,7 +28,7 @@ const MIN_READ_NOISE: f64 = 0.5;
 const MIN_NEIGHBOUR_LIGHT: f64 = 10.0;
 
 /// Numbers of pixels whose samples are filled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DefectivePixels {
     /// Those that are saturated in nearly all photographs.
     pub hot: usize,
@@ -36,32 +38,32 @@ pub struct DefectivePixels {
 
 impl AddAssign for DefectivePixels {
     fn add_assign(&mut self, other: Self) {
-        self.hot += other.hot;
-        self.dead += other.dead;
+        self.hot = self.hot.saturating_add(other.hot);
+        self.dead = self.dead.saturating_add(other.dead);
     }
 }
 
 impl Measurements {
-    /// Fills the hot pixels and then the dead ones of the loaded rows from row `first_row` on; codes are `quantum` apart.
+    /// Fills the hot pixels and then the dead ones of the loaded ones of `rows`; codes are `quantum` apart.
     /// Pixels without a loaded neighbour stay as they are. Returns the numbers of filled pixels.
-    pub fn fill_defective_pixels(&mut self, first_row: u32, quantum: f64) -> DefectivePixels {
+    pub fn fill_defective_pixels(&mut self, rows: Range<u32>, quantum: f64) -> DefectivePixels {
         DefectivePixels {
-            hot: self.fill_hot_pixels(first_row),
-            dead: self.fill_dead_pixels(first_row, quantum),
+            hot: self.fill_hot_pixels(rows.clone()),
+            dead: self.fill_dead_pixels(rows, quantum),
         }
     }
 
     /// Replaces the samples of hot pixels by the means of their neighbours in the row. Returns their number.
-    fn fill_hot_pixels(&mut self, first_row: u32) -> usize {
+    fn fill_hot_pixels(&mut self, rows: Range<u32>) -> usize {
         let is_hot = |row: &PixelSpan<f64>, x: usize, neighbours: [usize; 2]| {
             let [a, b] = neighbours.map(|x| row.values[x]);
             row.values[x] >= MIN_HOT_SHARE && a.max(b) <= MAX_NEIGHBOUR_SHARE
         };
-        self.fill_pixels(first_row, Self::saturated_share, is_hot)
+        self.fill_pixels(rows, Self::saturated_share, is_hot)
     }
 
     /// Replaces the samples of dead pixels by the means of their neighbours in the row. Returns their number.
-    fn fill_dead_pixels(&mut self, first_row: u32, quantum: f64) -> usize {
+    fn fill_dead_pixels(&mut self, rows: Range<u32>, quantum: f64) -> usize {
         let read_noise = self.noise.floor.map(f64::sqrt);
         if read_noise
             .iter()
@@ -81,7 +83,7 @@ impl Measurements {
         let first = full_scales.map(|own| self.full_scale.iter().position(|other| other == own));
         let first: Vec<usize> = first.flatten().collect();
         self.fill_pixels(
-            first_row,
+            rows,
             |measurements, n| measurements.has_one_code(n, &first),
             is_dead,
         )
@@ -91,7 +93,7 @@ impl Measurements {
     /// those of their neighbours. Returns their number.
     fn fill_pixels<V>(
         &mut self,
-        first_row: u32,
+        rows: Range<u32>,
         value: impl Fn(&Self, usize) -> V,
         is_defective: impl Fn(&PixelSpan<'_, V>, usize, [usize; 2]) -> bool,
     ) -> usize {
@@ -100,8 +102,8 @@ impl Measurements {
             return 0;
         }
         let mut filled = 0;
-        let mut start = self.loaded.count_above(first_row);
-        let rows = self.loaded.rows().iter().skip_while(|y| *y < first_row);
+        let mut start = self.loaded.count_above(rows.start);
+        let rows = self.loaded.rows().iter().filter(|y| rows.contains(y));
         let spans: Vec<Range<u32>> = rows.flat_map(|y| self.loaded.spans_of(y)).collect();
         for columns in spans {
             let count = columns.len();
@@ -177,14 +179,14 @@ mod tests {
     fn hot_pixels_are_filled_and_no_others() {
         let mut measurements = SyntheticCapture::smooth(12).measurements;
         let clean = measurements.photos.clone();
-        assert_eq!(measurements.fill_hot_pixels(0), 0);
+        assert_eq!(measurements.fill_hot_pixels(0..u32::MAX), 0);
         assert_eq!(measurements.photos, clean);
         let (hot, corner) = (5 * 32 + 7, 31 * 32 + 31);
         for photo in &mut measurements.photos {
             photo[hot] = [f32::NAN; 3];
             photo[corner] = [f32::NAN; 3];
         }
-        assert_eq!(measurements.fill_hot_pixels(0), 2);
+        assert_eq!(measurements.fill_hot_pixels(0..u32::MAX), 2);
         for (photo, clean) in measurements.photos.iter().zip(&clean) {
             for n in 0..clean.len() {
                 let expected = match n {
@@ -199,7 +201,7 @@ mod tests {
         for photo in &mut measurements.photos {
             photo[40..50].fill([f32::NAN; 3]);
         }
-        assert_eq!(measurements.fill_hot_pixels(0), 0);
+        assert_eq!(measurements.fill_hot_pixels(0..u32::MAX), 0);
     }
 
     #[test]
@@ -212,16 +214,18 @@ mod tests {
             measurements.full_scale[l] = 2.0;
         }
         let clean = measurements.photos.clone();
-        assert_eq!(measurements.fill_dead_pixels(0, QUANTUM), 0);
+        assert_eq!(measurements.fill_dead_pixels(0..u32::MAX, QUANTUM), 0);
         let (dead, dark) = (5 * 32 + 7, 9 * 32 + 7);
         for (l, photo) in measurements.photos.iter_mut().enumerate() {
             photo[dead] = [if [3, 7].contains(&l) { -0.0005 } else { -0.001 }; 3];
             // Without light, samples vary.
             photo[dark] = [1e-5 * (l % 2) as f32; 3];
         }
-        let coarse = measurements.clone().fill_dead_pixels(0, 3.0 * QUANTUM);
+        let coarse = measurements
+            .clone()
+            .fill_dead_pixels(0..u32::MAX, 3.0 * QUANTUM);
         assert_eq!(coarse, 0);
-        assert_eq!(measurements.fill_dead_pixels(0, QUANTUM), 1);
+        assert_eq!(measurements.fill_dead_pixels(0..u32::MAX, QUANTUM), 1);
         for (photo, clean) in measurements.photos.iter().zip(&clean) {
             let expected = 0.5 * (clean[dead - 1][1] + clean[dead + 1][1]);
             assert!((photo[dead][1] - expected).abs() < 1e-6);
@@ -232,6 +236,6 @@ mod tests {
             photo[dead - 1] = [0.0; 3];
             photo[dead] = [0.0; 3];
         }
-        assert_eq!(measurements.fill_dead_pixels(0, QUANTUM), 0);
+        assert_eq!(measurements.fill_dead_pixels(0..u32::MAX, QUANTUM), 0);
     }
 }

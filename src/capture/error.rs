@@ -23,7 +23,7 @@ pub struct CaptureError {
 }
 
 impl CaptureError {
-    pub(super) fn new(path: impl Into<PathBuf>, problem: CaptureErrorKind) -> Self {
+    pub(crate) fn new(path: impl Into<PathBuf>, problem: CaptureErrorKind) -> Self {
         Self {
             path: path.into(),
             field: None,

@@ -11,6 +11,7 @@ use super::ltm_file::LtmFileError;
 use super::output_file::InputError;
 use super::process_resources::{INTERRUPTED_STATUS, Interrupted};
 use super::recover::{CheckpointInUseError, FaultyPhotographsError, StrictError, UnusableError};
+use super::stage::StageFileError;
 use super::value_parsers::UsageError;
 use crate::calibrate::CalibrationError;
 use crate::capture::{CaptureError, CaptureErrorKind};
@@ -132,6 +133,7 @@ fn has_passing_code(_: &io::Error) -> bool {
 fn is_temporary(cause: Cause<'_>) -> bool {
     io_error(cause).is_some_and(may_pass)
         || cause.is::<CheckpointInUseError>()
+        || cause.downcast_ref().is_some_and(StageFileError::is_missing)
         || matches!(cause.downcast_ref(), Some(FormatError::Memory(_)))
 }
 
@@ -143,6 +145,7 @@ fn is_of_data(cause: Cause<'_>) -> bool {
         || cause.is::<CaptureError>()
         || cause.is::<CalibrationError>()
         || cause.is::<LtmFileError>()
+        || cause.is::<StageFileError>()
         || cause.is::<PhotoFileError>()
         || cause.downcast_ref().is_some_and(is_of_photographs)
         || cause.downcast_ref().is_some_and(is_of_file)

@@ -1,11 +1,12 @@
 //! Errors, warnings and notes about a capture.
 
+use std::borrow::Cow;
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a finding means for the recovery.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// The capture cannot be recovered, or not rightly.
@@ -27,11 +28,11 @@ impl fmt::Display for Severity {
 }
 
 /// One finding, in JSON as in text.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Finding {
     pub severity: Severity,
     /// Names the kind of finding.
-    pub code: &'static str,
+    pub code: Cow<'static, str>,
     /// Indices in the manifest's `shots`; none if it is not about some of them.
     pub shots: Vec<usize>,
     /// The problem, and its remedy.
@@ -54,7 +55,7 @@ impl Finding {
     fn new(severity: Severity, code: &'static str, message: String) -> Self {
         Self {
             severity,
-            code,
+            code: Cow::Borrowed(code),
             shots: Vec::new(),
             message,
         }

@@ -1,5 +1,7 @@
 //! Reads patterns and photographs of several shots in parallel; photographs row by row from the top.
 
+use std::ops::Range;
+
 use anyhow::{Context, Error, Result};
 use rayon::prelude::*;
 
@@ -103,15 +105,15 @@ impl<'a> MeasurementReader<'a> {
         Ok(())
     }
 
-    /// Fills the hot and dead pixels of the loaded rows from `first_row` on. The photographs have these statistics of their
+    /// Fills the hot and dead pixels of the loaded ones of `rows`. The photographs have these statistics of their
     /// `codes`.
     pub fn fill_defects(
         &self,
         measurements: &mut Measurements,
-        first_row: u32,
+        rows: Range<u32>,
         codes: &CodeStatistics,
     ) -> DefectivePixels {
-        measurements.fill_defective_pixels(first_row, f64::from(codes.step()) * self.code)
+        measurements.fill_defective_pixels(rows, f64::from(codes.step()) * self.code)
     }
 
     /// Loads `pixels`, estimates the noise from them, and reads the rest of all files, which checks that they are whole.
@@ -145,7 +147,7 @@ impl ReadSample {
         let codes = codes.fold(CodeStatistics::default(), CodeStatistics::merge);
         let quantum = f64::from(codes.step()) * code;
         measurements.noise = measurements.noise.with_quantum(quantum);
-        let defects = measurements.fill_defective_pixels(0, quantum);
+        let defects = measurements.fill_defective_pixels(0..u32::MAX, quantum);
         measurements.noise = NoiseModel::with_gain_from(measurements);
         Self {
             codes,

@@ -27,12 +27,14 @@ mod photograph;
 mod process_resources;
 mod progress;
 mod quality_report;
+mod records;
 mod recover;
 mod relight;
 mod relit_picture;
 mod report;
 mod shoot;
 mod simulate;
+mod stage;
 mod study;
 mod study_faults;
 mod tiles;
@@ -62,6 +64,7 @@ enum Command {
     Photograph(photograph::PhotographArgs),
     Check(check::CheckArgs),
     Recover(recover::RecoverArgs),
+    Stage(stage::StageArgs),
     Encode(encode::EncodeArgs),
     Evaluate(evaluate::EvaluateArgs),
     Report(quality_report::ReportArgs),
@@ -89,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Photograph(args) => photograph::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Stage(args) => stage::run(&args),
         Command::Encode(args) => encode::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Report(args) => quality_report::run(&args),

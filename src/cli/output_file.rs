@@ -26,6 +26,14 @@ pub fn temporary_beside(path: &Path, mode: u32) -> (tempfile::Builder<'static, '
     (builder, folder)
 }
 
+/// The error without the name of a temporary file.
+pub fn without_path(error: io::Error) -> io::Error {
+    match error.raw_os_error() {
+        Some(code) => io::Error::from_raw_os_error(code),
+        None => error.kind().into(),
+    }
+}
+
 #[derive(Debug)]
 pub struct FileSignature {
     /// With its article.
@@ -63,6 +71,15 @@ pub const HTML: FileSignature = FileSignature {
 };
 
 impl FileSignature {
+    /// Of files that may replace any other, as their names are this program's own.
+    pub const fn of_own_name(name: &'static str) -> Self {
+        Self {
+            name,
+            extension: None,
+            signature: &[],
+        }
+    }
+
     /// Whether `path` is free, empty, or holds a file of this format as this program writes it.
     fn may_replace(&self, path: &Path) -> io::Result<bool> {
         let file = match File::open(path) {
@@ -123,7 +140,7 @@ impl OutputFile {
             let (builder, folder) = temporary_beside(path, 0o666);
             builder
                 .tempfile_in(folder)
-                .map_err(|e| io::Error::from(e.kind())) // without the temporary name
+                .map_err(without_path)
                 .context("cannot be created; does its folder exist, and may you write there?")
         };
         let file = create().with_context(|| path.display().to_string())?;

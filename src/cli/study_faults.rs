@@ -302,8 +302,8 @@ fn findings(report: &RecoverReport) -> Vec<String> {
     findings.extend(named);
     for warning in &report.warnings {
         // Photographs that are left out have warnings with the same codes.
-        if !verdicts.contains_key(warning.code) {
-            findings.push(warning.code.to_owned());
+        if !verdicts.contains_key(&*warning.code) {
+            findings.push(warning.code.to_string());
         }
     }
     let values = report.estimated_fields.iter();

@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
 
 use crate::transport::Extent;
 
@@ -40,7 +41,7 @@ pub fn value_name(value: impl ValueEnum) -> String {
 }
 
 /// A number of bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ByteCount(pub u64);
 
 impl ByteCount {

@@ -13,7 +13,7 @@ use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileTransportFuncti
 
 /// Camera pixels along a side of a tile in the file. Larger tiles than those of the recovery compress better; these are
 /// still small enough to load only the visible ones.
-pub(super) const FILE_TILE_SIDE: u32 = 128;
+pub const FILE_TILE_SIDE: u32 = 128;
 /// Default loss of SNR by the file, as hold-out validation estimates it. Validation recovers from fewer patterns, and
 /// so with slightly more noise.
 const DEFAULT_LOSS: Decibels = Decibels(0.5);

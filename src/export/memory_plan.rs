@@ -188,6 +188,7 @@ impl MemoryPlan {
         (self.tile_rows() * self.camera.width.div_ceil(TILE_SIDE)) as usize
     }
 
+    /// Number of rows of tiles.
     fn tile_rows(&self) -> u32 {
         self.camera.height.div_ceil(TILE_SIDE)
     }
@@ -207,21 +208,25 @@ impl MemoryPlan {
         &self.gray_code_rows
     }
 
-    /// Strips of tile rows from the top down, each with the camera rows to load for it: its own and `halo` more on
+    /// Strips of these rows of tiles from the top down, each with the camera rows to load for it: its own and `halo` more on
     /// either side.
-    pub fn strips(&self, halo: u32) -> Vec<(Range<u32>, Range<u32>)> {
-        let tile_rows = self.tile_rows();
-        if self.fits_photographs() {
-            return vec![(0..tile_rows, 0..self.camera.height)];
-        }
-        let count = (self.rows_at_once.saturating_sub(2 * halo) / TILE_SIDE).max(1);
+    pub fn strips(&self, tile_rows: Range<u32>, halo: u32) -> Vec<(Range<u32>, Range<u32>)> {
+        let count = match self.fits_photographs() {
+            true => tile_rows.len() as u32,
+            false => self.rows_at_once.saturating_sub(2 * halo) / TILE_SIDE,
+        };
+        let count = count.max(1);
         let strip = |first: u32| {
-            let strip = first..(first + count).min(tile_rows);
+            let strip = first..first.saturating_add(count).min(tile_rows.end);
             let start = (strip.start * TILE_SIDE).saturating_sub(halo);
             let end = (strip.end * TILE_SIDE + halo).min(self.camera.height);
             (strip, start..end)
         };
-        (0..tile_rows).step_by(count as usize).map(strip).collect()
+        tile_rows
+            .clone()
+            .step_by(count as usize)
+            .map(strip)
+            .collect()
     }
 }
 
@@ -274,7 +279,7 @@ mod tests {
             assert!((1..=8).contains(&plan.tiles_at_once));
             for halo in [0, 8] {
                 let mut next = 0;
-                for (strip, rows) in plan.strips(halo) {
+                for (strip, rows) in plan.strips(0..25, halo) {
                     assert_eq!(strip.start, next);
                     next = strip.end;
                     let start = (strip.start * 32).saturating_sub(halo);
@@ -284,6 +289,12 @@ mod tests {
                 assert_eq!(next, 25);
             }
             assert_eq!(plan.fits_photographs(), megabytes == 4000);
+            if plan.fits_photographs() {
+                // One strip, also of a part of the picture; none of no rows.
+                assert_eq!(plan.strips(0..25, 8), [(0..25, 0..800)]);
+                assert_eq!(plan.strips(4..8, 8), [(4..8, 120..264)]);
+                assert_eq!(plan.strips(4..4, 8), []);
+            }
         }
     }
 

@@ -14,7 +14,7 @@ mod shot_selection;
 mod tile_record;
 
 pub use capture_remedy::capture_remedy;
-pub use encoding::{FileQuality, encode_file, file_geometry, file_tile};
+pub use encoding::{FILE_TILE_SIDE, FileQuality, encode_file, file_geometry, file_tile};
 #[cfg(not(target_arch = "wasm32"))]
 pub use memory_plan::{CaptureSize, MemoryPlan, TooLittleMemory};
 pub use metadata::{Provenance, metadata};

@@ -10,6 +10,8 @@
 //! The squares are recovered from the training patterns alone. What a method learns from the whole picture, a prior
 //! and the weights of a blend, has seen all patterns, the held-out ones included.
 
+use serde::{Deserialize, Serialize};
+
 use super::error::RecoverError;
 use super::holdout_split::{HoldoutSplit, pattern_ids};
 use super::preparation_input::RecoveryPreparationInput;
@@ -40,7 +42,7 @@ pub(super) fn sample_squares(camera: Extent) -> Vec<TileRect> {
 }
 
 /// Squares of the picture, recovered from the training patterns, with their measurements under the held-out ones.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HoldoutValidation {
     geometry: Geometry,
     patterns: Vec<Pattern>,
@@ -53,7 +55,7 @@ pub struct HoldoutValidation {
     residual: f64,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct ValidationRegion {
     tile: FloatTile,
     /// Under the held-out patterns, `[pixel, pattern, channel]`.

@@ -202,7 +202,7 @@ mod tests {
     /// All that is learned, chosen and found, as text.
     fn prepare(mut measurements: Measurements, method: Method, window: Option<Window>) -> String {
         let executor = &SequentialExecutor;
-        measurements.fill_defective_pixels(0, QUANTUM);
+        measurements.fill_defective_pixels(0..u32::MAX, QUANTUM);
         measurements.noise = NoiseModel::with_gain_from(&measurements);
         pollster::block_on(async {
             let estimate = match window {

@@ -75,7 +75,7 @@ pub struct PreparedRecovery {
     split: HoldoutSplit,
     photometry: Photometry,
     solver: TileSolver,
-    /// Not needed to recover tiles elsewhere.
+    /// Not needed to recover tiles elsewhere; [`restore`](Self::restore) gives it back.
     #[serde(skip)]
     holdout_validation: Option<HoldoutValidation>,
 }
@@ -261,6 +261,17 @@ impl PreparedRecovery {
     /// The validation on held-out patterns; `None` if there are too few patterns to hold any out.
     pub fn holdout_validation(&self) -> Option<&HoldoutValidation> {
         self.holdout_validation.as_ref()
+    }
+
+    /// Gives back what a recovery was serialised without: its validation, and the photographs that are left out with their
+    /// [faults](Self::faults).
+    pub fn restore(
+        &mut self,
+        validation: Option<HoldoutValidation>,
+        faults: Vec<(usize, PhotographFault)>,
+    ) {
+        self.holdout_validation = validation;
+        self.photometry.faults = faults;
     }
 
     /// Distance from a tile, in camera pixels, of the measurements that the tile depends on.

@@ -42,7 +42,7 @@ impl TileTransportFunctions {
 
 /// A tile before quantisation, in units of the measurement: `τ_n = Σ_k c_nk v_k + d_n`. Either part may be zero; a
 /// recovered tile has one of both.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FloatTile {
     /// The pixels of the tile.
     pub rect: TileRect,

@@ -6,7 +6,7 @@ use std::iter::Sum;
 use bytemuck::{Pod, Zeroable};
 
 /// A ratio in decibels: 20 log10 of a ratio of amplitudes.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
 #[serde(transparent)]
 pub struct Decibels(pub f64);
 

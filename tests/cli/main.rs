@@ -17,6 +17,7 @@ mod reference;
 mod report;
 mod session;
 mod simulate;
+mod stage;
 #[cfg(unix)]
 mod streaming;
 mod study;

@@ -26,28 +26,39 @@ fn the_reference_agrees_with_the_definition() {
 
 /// Every subcommand with its arguments, in Markdown.
 fn reference(program: &Command) -> String {
-    let name = program.get_name();
-    let subcommands = program.get_subcommands();
-    subcommands.map(|command| section(name, command)).collect()
+    let commands = program.get_subcommands();
+    commands.flat_map(|command| sections("", command)).collect()
 }
 
-fn section(program: &str, command: &Command) -> String {
+/// The section of a command, or those of its own subcommands; `parent` is what precedes its name.
+fn sections(parent: &str, command: &Command) -> Vec<String> {
+    let name = format!("{parent}{}", command.get_name());
+    if !command.has_subcommands() {
+        return vec![section(&name, command)];
+    }
+    let about = sentence(&command.get_about().unwrap_or_default().to_string());
+    let parent = format!("{name} ");
+    let of_subcommands = command.get_subcommands();
+    let of_subcommands = of_subcommands.flat_map(|command| sections(&parent, command));
+    std::iter::once(format!("\n### {name}\n\n{about}\n"))
+        .chain(of_subcommands)
+        .collect()
+}
+
+fn section(name: &str, command: &Command) -> String {
     let (positional, options): (Vec<&Arg>, Vec<&Arg>) = command
         .get_arguments()
         .filter(|argument| !argument.is_hide_set())
         .partition(|argument| argument.is_positional());
-    let usage = usage(program, command, &positional, &options);
+    let usage = usage(name, &positional, &options);
     let about = sentence(&command.get_about().unwrap_or_default().to_string());
     let rows: String = positional.into_iter().chain(options).map(row).collect();
-    format!(
-        "\n### {}\n\n{about}\n\n```sh\n{usage}\n```\n\n| argument | |\n|---|---|\n{rows}",
-        command.get_name()
-    )
+    format!("\n### {name}\n\n{about}\n\n```sh\n{usage}\n```\n\n| argument | |\n|---|---|\n{rows}")
 }
 
 /// The required arguments; the others are options.
-fn usage(program: &str, command: &Command, positional: &[&Arg], options: &[&Arg]) -> String {
-    let mut words = vec![program.to_owned(), command.get_name().to_owned()];
+fn usage(name: &str, positional: &[&Arg], options: &[&Arg]) -> String {
+    let mut words = vec![format!("ltm-export {name}")];
     words.extend(
         positional
             .iter()

@@ -69,7 +69,12 @@ impl<'a> Examination<'a> {
         findings.add(window.and_then(|window| photograph_findings::few_patterns(patterns, window)));
         let reports = prepared.as_ref().map(|prepared| {
             let moved = &findings.moved_shots;
-            photograph_reports(&sample.folder, &sample.shots, &prepared.recovery, moved)
+            photograph_reports(
+                sample.folder.manifest(),
+                &sample.shots,
+                &prepared.recovery,
+                moved,
+            )
         });
         let (camera, light) = (sample.measurements.camera, sample.measurements.light);
         let examined = ExaminedCapture {
@@ -118,7 +123,7 @@ impl<'a> Examination<'a> {
             }
             (Ok(prepared), None) => {
                 let of_preparation = messages::preparation(&prepared).into_iter();
-                findings.add(of_preparation.map(|finding| match finding.code {
+                findings.add(of_preparation.map(|finding| match &*finding.code {
                     "low-snr" => as_refusal(finding),
                     _ => finding,
                 }));

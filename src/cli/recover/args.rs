@@ -1,10 +1,11 @@
-//! Arguments of `ltm-export recover`.
+//! Arguments of `ltm-export recover`, and the options that it shares with its stages.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
 
-use crate::cli::value_parsers::{ByteCount, parse_number};
+use crate::cli::value_parsers::{ByteCount, UsageError, parse_number};
 use crate::export::FileQuality;
 use crate::format::HEADER_BYTES;
 use crate::recover::{Method, SparsityBasis};
@@ -12,7 +13,7 @@ use crate::transport::{Decibels, Window};
 
 /// Enough for about four megapixels under 80 patterns to be read once. A constant, so that the same command fits, or is
 /// refused, on every machine.
-const DEFAULT_MEMORY: &str = "4G";
+pub const DEFAULT_MEMORY: &str = "4G";
 
 /// Recover the light transport of an object from a folder of photographs
 #[derive(Debug, Args)]
@@ -22,6 +23,22 @@ pub struct RecoverArgs {
     /// File to write
     #[arg(short, long, value_name = "FILE.ltm")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub options: RecoveryOptions,
+    /// Limit on memory; photographs that do not fit are read twice, in strips. The file is the same
+    #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
+    pub memory: ByteCount,
+    /// Continue an interrupted recovery from FILE.ltm.checkpoint
+    #[arg(long)]
+    pub resume: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What determines the file that is recovered from a capture.
+#[derive(Clone, Debug, PartialEq, Args, Serialize, Deserialize)]
+pub struct RecoveryOptions {
     /// Recovery method
     #[arg(long, value_enum, default_value_t = MethodName::Learned)]
     method: MethodName,
@@ -49,30 +66,30 @@ pub struct RecoverArgs {
     /// many for pictures of more than 1024 pixels a side, otherwise 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=12))]
     pub levels: Option<u32>,
-    /// Limit on memory; photographs that do not fit are read twice, in strips. The file is the same
-    #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
-    pub memory: ByteCount,
     /// Which responses of display and camera to use where the photographs contradict capture.json
     #[arg(long, value_enum, default_value_t = TrustedCalibration::Declared)]
     pub trust: TrustedCalibration,
     /// Do not estimate and correct shifts of the picture between photographs
     #[arg(long)]
     pub no_register: bool,
-    /// Continue an interrupted recovery from FILE.ltm.checkpoint
-    #[arg(long)]
-    pub resume: bool,
     /// Fail with exit status 65, and write nothing, if there is a warning
     #[arg(long)]
     pub strict: bool,
     /// Write the file even if the photographs do not follow from their patterns
     #[arg(long)]
     pub force: bool,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
 }
 
-impl RecoverArgs {
+impl RecoveryOptions {
+    /// # Errors
+    /// [`UsageError`] if options contradict one another.
+    pub fn check(&self) -> Result<(), UsageError> {
+        match self.basis.is_some() && self.method().basis().is_none() {
+            true => Err(UsageError("--basis is for --method bpdn")),
+            false => Ok(()),
+        }
+    }
+
     pub fn method(&self) -> Method {
         match self.method {
             MethodName::Learned => Method::Learned,
@@ -115,7 +132,8 @@ pub fn parse_window(text: &str) -> Result<WindowArg, String> {
     Window::new(side).map(Some).map_err(|e| e.to_string())
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum MethodName {
     /// A prior learned from the photographs themselves
     Learned,
@@ -126,7 +144,8 @@ pub enum MethodName {
 }
 
 /// Which responses are used where the photographs contradict `capture.json`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum TrustedCalibration {
     /// capture.json; differences are warnings
     Declared,

@@ -1,6 +1,8 @@
 //! Fields of the manifest that the photographs contradict, with their estimates.
 
-use serde::Serialize;
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::capture::{CameraResponse, CodeStatistics, Manifest};
@@ -16,10 +18,10 @@ const MAX_LINEAR_LOG_PARAMETER: f64 = 0.05;
 const SRGB_EXPONENT: f64 = 2.2;
 
 /// A field of the manifest that is estimated from the photographs, in `recover --json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EstimatedField {
     /// The field, for instance `light.gamma`.
-    pub field: &'static str,
+    pub field: Cow<'static, str>,
     /// Its value in the manifest; null if left out.
     pub declared: Value,
     /// The value that explains the photographs.
@@ -31,7 +33,7 @@ pub struct EstimatedField {
 impl EstimatedField {
     fn new(field: &'static str, declared: impl Serialize, estimated: impl Serialize) -> Self {
         Self {
-            field,
+            field: Cow::Borrowed(field),
             declared: json!(declared),
             estimated: json!(estimated),
             is_used: false,
@@ -50,7 +52,7 @@ impl EstimatedField {
 
     /// The finding that the photographs contradict the manifest at `path`: a warning unless the estimate is used.
     pub fn finding(&self, path: &str, reason: &str) -> Finding {
-        let (code, remedy) = match self.field {
+        let (code, remedy) = match &*self.field {
             "light.dimming" => (
                 "display-dims",
                 "Switch off power saving and dynamic contrast of the display, and photograph again",
@@ -177,7 +179,7 @@ pub fn response_reason(
     declared: Option<Decibels>,
     estimated: Decibels,
 ) -> String {
-    let what = match field.field {
+    let what = match &*field.field {
         "camera.response" => "the photographs are not linear",
         _ => "the display does not emit what is declared",
     };

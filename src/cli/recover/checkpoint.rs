@@ -1,7 +1,6 @@
 //! The checkpoint of a recovery: the tiles recovered so far, to resume from after an interruption.
 //!
-//! An append-only file beside the output: the 8 bytes `LTMPART2`, then records. A record has its number, the length of
-//! its content, the CRC-32C of these two and the content (4 bytes each, little-endian), and the content:
+//! A file beside the output: the 8 bytes `LTMPART2`, then [records](crate::cli::records):
 //!
 //! | number | content |
 //! |---|---|
@@ -21,7 +20,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use anyhow::{Context, Error, Result, bail, ensure};
 
 use super::checkpoint_key::CheckpointKey;
+use super::tile_recovery::{TileSink, decompress_tile};
 use crate::cli::process_resources::Interrupted;
+use crate::cli::records::{RECORD_HEAD_BYTES, RecordReader, encode_record};
 
 const MAGIC: [u8; 8] = *b"LTMPART2";
 /// What the magics of all versions begin with.
@@ -31,10 +32,6 @@ const OTHER_VERSION: &str = "was written by another version of this program; use
                              from the beginning";
 /// Maximum length of a key. Tens of thousands of photographs need a few megabytes.
 const MAX_KEY_BYTES: u32 = 64 << 20;
-/// Level of zstd for tiles: the fastest, as each is read a few times and then deleted.
-const ZSTD_LEVEL: i32 = 1;
-/// Bytes before the content of a record: number, length, checksum.
-const RECORD_HEAD_BYTES: usize = 12;
 const KEY: u32 = u32::MAX;
 const FINGERPRINT: u32 = u32::MAX - 1;
 
@@ -51,24 +48,9 @@ pub struct Checkpoint {
     pub delete_on_drop: bool,
 }
 
-struct CheckpointRecord {
-    number: u32,
-    content: Vec<u8>,
-    range: Range<u64>,
-    is_intact: bool,
-}
-
 /// Locks a checkpoint that threads share.
 pub fn lock(checkpoint: &Mutex<Checkpoint>) -> MutexGuard<'_, Checkpoint> {
     checkpoint.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Compresses the record of a tile for [`Checkpoint::add`].
-///
-/// # Errors
-/// If memory is missing.
-pub fn compress_tile(record: &[u8]) -> io::Result<Vec<u8>> {
-    zstd::bulk::compress(record, ZSTD_LEVEL)
 }
 
 /// Another process writes the same file.
@@ -132,10 +114,6 @@ impl Checkpoint {
         self.tiles.iter().flatten().count()
     }
 
-    pub fn has(&self, i: usize) -> bool {
-        self.tiles[i].is_some()
-    }
-
     /// Flushes the tiles to disk, and returns the error of a recovery that was interrupted.
     pub fn interrupted(&self) -> Error {
         let (count, tiles, path) = (self.count(), self.tiles.len(), self.path.display());
@@ -165,20 +143,13 @@ impl Checkpoint {
         }
     }
 
-    /// Appends tile `i` with `content`, its record compressed by [`compress_tile`].
-    pub fn add(&mut self, i: usize, content: &[u8]) -> Result<()> {
-        self.tiles[i] = Some(self.append(i as u32, content)?);
-        self.delete_on_drop = false;
-        Ok(())
-    }
-
     /// Reads tile `i`'s record, decompressed.
     pub fn read(&mut self, i: usize) -> io::Result<Vec<u8>> {
         let range = self.tiles[i].clone().ok_or(ErrorKind::NotFound)?;
         let mut content = vec![0; (range.end - range.start) as usize];
         self.file.seek(SeekFrom::Start(range.start))?;
         self.file.read_exact(&mut content)?;
-        zstd::decode_all(&content[..])
+        decompress_tile(&content)
     }
 
     /// Appends a record; returns the range of its content.
@@ -208,15 +179,19 @@ impl Checkpoint {
             "exists and is not a checkpoint; move it away"
         );
         self.end = MAGIC.len() as u64;
-        let Some(first) = self.read_record(&mut reader, bytes)? else {
+        let mut records = RecordReader::new(reader, self.end, bytes);
+        let Some(head) = records.head()? else {
             return Ok(false);
         };
-        ensure!(first.is_intact, DAMAGED);
+        // A key whose length is damaged must not look cut off: tiles may follow it.
+        ensure!(head.number == KEY && head.length <= MAX_KEY_BYTES, DAMAGED);
+        let first = records.record(head)?.filter(|first| first.is_intact);
+        let first = first.context(DAMAGED)?;
         let recorded: CheckpointKey =
             serde_json::from_slice(&first.content).context(OTHER_VERSION)?;
         self.end = first.range.end;
         self.tiles = vec![None; recorded.tiles];
-        while let Some(record) = self.read_record(&mut reader, bytes)? {
+        while let Some(record) = records.next()? {
             if !record.is_intact {
                 // A crash may leave a last record of the right length without its bytes.
                 if record.range.end < bytes {
@@ -256,44 +231,24 @@ impl Checkpoint {
         self.file.set_len(self.end)?;
         Ok(true)
     }
-
-    /// Reads the record after the last complete one; `None` if the file of so many bytes ends before its end.
-    fn read_record(&self, reader: &mut impl Read, bytes: u64) -> Result<Option<CheckpointRecord>> {
-        let start = self.end + RECORD_HEAD_BYTES as u64;
-        if bytes < start {
-            return Ok(None);
-        }
-        let mut head = [0; RECORD_HEAD_BYTES];
-        reader.read_exact(&mut head)?;
-        let (words, _) = head.as_chunks();
-        let [number, length, crc] = [0, 1, 2].map(|i| u32::from_le_bytes(words[i]));
-        let end = start + u64::from(length);
-        // A key whose length is damaged must not look cut off: tiles may follow it.
-        let is_first = self.end == MAGIC.len() as u64;
-        let is_key = number == KEY && length <= MAX_KEY_BYTES && end <= bytes;
-        ensure!(is_key || !is_first, DAMAGED);
-        if bytes < end {
-            return Ok(None);
-        }
-        let mut content = vec![0; length as usize];
-        reader.read_exact(&mut content)?;
-        let computed_crc = crc32c::crc32c_append(crc32c::crc32c(&head[..8]), &content);
-        Ok(Some(CheckpointRecord {
-            number,
-            content,
-            range: start..end,
-            is_intact: computed_crc == crc,
-        }))
-    }
 }
 
-fn encode_record(number: u32, content: &[u8]) -> Result<Vec<u8>> {
-    let length = u32::try_from(content.len()).context("a record is too large")?;
-    let mut bytes = [number, length].map(u32::to_le_bytes).concat();
-    let crc = crc32c::crc32c_append(crc32c::crc32c(&bytes), content);
-    bytes.extend(crc.to_le_bytes());
-    bytes.extend(content);
-    Ok(bytes)
+/// Of threads that share it.
+impl TileSink for Mutex<Checkpoint> {
+    fn count(&self) -> usize {
+        lock(self).count()
+    }
+
+    fn has(&self, i: usize) -> bool {
+        lock(self).tiles[i].is_some()
+    }
+
+    fn add(&self, i: usize, content: &[u8]) -> Result<()> {
+        let mut checkpoint = lock(self);
+        checkpoint.tiles[i] = Some(checkpoint.append(i as u32, content)?);
+        checkpoint.delete_on_drop = false;
+        Ok(())
+    }
 }
 
 impl Drop for Checkpoint {

@@ -5,13 +5,13 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use crc32c::Crc32cReader;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::args::RecoverArgs;
-use crate::capture::CaptureFolder;
+use super::inputs::RecoveryInputs;
+use crate::capture::{CaptureError, CaptureErrorKind};
 use crate::cli::process_resources::{Interrupted, InterruptibleCores};
 use crate::cli::value_parsers::value_name;
 use crate::export::MemoryPlan;
@@ -20,7 +20,7 @@ use crate::recover::{HoldoutValidation, PreparedRecovery};
 use crate::transport::Window;
 
 /// Name and version of this program.
-const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
+pub const PROGRAM: &str = concat!("ltm-export ", env!("CARGO_PKG_VERSION"));
 
 /// Everything that determines the recovered tiles.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,31 +46,23 @@ pub struct CheckpointKey {
 }
 
 impl CheckpointKey {
-    /// The key of a recovery by `args` from `shots`. Reads all their files.
+    /// The key of a recovery from `inputs`. Reads all their files.
     pub fn new(
-        args: &RecoverArgs,
-        folder: &CaptureFolder,
-        shots: &[usize],
+        inputs: &RecoveryInputs<'_>,
         plan: &MemoryPlan,
         cores: &InterruptibleCores,
     ) -> Result<Self> {
-        let digest = |(name, path): (&str, PathBuf)| -> Result<(String, FileDigest)> {
-            let interrupted = || Interrupted("interrupted before anything was read".to_owned());
-            ensure!(!cores.is_cancelled(), interrupted());
-            let digest = FileDigest::of(&path).with_context(|| path.display().to_string())?;
-            Ok((name.to_owned(), digest))
-        };
-        let files = folder.files(shots).into_par_iter().map(digest);
-        let method = args.method();
+        let options = inputs.options;
+        let method = options.method();
         Ok(Self {
             program: PROGRAM.to_owned(),
             method: method.name().to_owned(),
             basis: method.basis().map(|basis| basis.name().to_owned()),
-            window: args.window.map(Window::side),
-            patterns: args.patterns,
-            trust: value_name(args.trust),
-            no_register: args.no_register,
-            files: files.collect::<Result<_>>()?,
+            window: options.window.map(Window::side),
+            patterns: options.patterns,
+            trust: value_name(options.trust),
+            no_register: options.no_register,
+            files: file_digests(inputs, cores)?,
             tiles: plan.tiles(),
         })
     }
@@ -115,10 +107,29 @@ impl CheckpointKey {
     }
 }
 
+/// Digests of all files that a recovery reads, by their names in the manifest.
+///
+/// # Errors
+/// If one cannot be read, and if the executor is cancelled.
+pub fn file_digests(
+    inputs: &RecoveryInputs<'_>,
+    cores: &InterruptibleCores,
+) -> Result<BTreeMap<String, FileDigest>> {
+    let digest = |(name, path): (&str, PathBuf)| -> Result<(String, FileDigest)> {
+        let interrupted = || Interrupted("interrupted before anything was read".to_owned());
+        ensure!(!cores.is_cancelled(), interrupted());
+        let digest = FileDigest::of(&path);
+        let digest = digest.map_err(|e| CaptureError::new(path, CaptureErrorKind::Io(e)))?;
+        Ok((name.to_owned(), digest))
+    };
+    let files = inputs.folder.files(&inputs.shots);
+    files.into_par_iter().map(digest).collect()
+}
+
 /// Length and CRC-32C of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileDigest {
-    bytes: u64,
+    pub bytes: u64,
     crc: u32,
 }
 

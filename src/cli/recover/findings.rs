@@ -1,19 +1,21 @@
 //! Findings about a capture from the preparation of its recovery.
 
 use anyhow::Result;
+use serde::{Deserialize, Serialize};
 
 use super::calibration::EstimatedField;
 use super::messages::StrictError;
 use crate::cli::finding::{Finding, Severity};
 
 /// The findings so far.
-#[derive(Default)]
+#[derive(Default, Serialize, Deserialize)]
 pub struct Findings {
     pub list: Vec<Finding>,
     pub estimated_fields: Vec<EstimatedField>,
     /// Shots that are left out as the camera had moved.
     pub moved_shots: Vec<usize>,
     /// Whether findings are printed at once.
+    #[serde(skip)]
     is_printed: bool,
 }
 
@@ -24,6 +26,11 @@ impl Findings {
             is_printed: true,
             ..Self::default()
         }
+    }
+
+    /// Prints further findings at once.
+    pub fn print_further(&mut self) {
+        self.is_printed = true;
     }
 
     /// Keeps findings.

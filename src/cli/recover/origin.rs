@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::capture::{CaptureFolder, ManifestCamera, NoiseModel};
@@ -16,7 +16,7 @@ use crate::transport::Decibels;
 const MAX_NOTES_BYTES: usize = 2048;
 
 /// The origin of a file; see docs/format.md. The same command writes the same.
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 pub struct FileOrigin {
     /// SHA-256 of the lines that `sha256sum` writes of the manifest and the files that the recovery reads, sorted by their paths.
     inputs_sha256: String,

@@ -2,7 +2,7 @@
 
 use anyhow::{Error, Result, bail};
 
-use super::args::{RecoverArgs, TrustedCalibration};
+use super::args::{RecoveryOptions, TrustedCalibration};
 use super::calibration;
 use super::capture_sample::{CaptureSample, PhotographSource};
 use super::findings::Findings;
@@ -52,13 +52,13 @@ pub struct PreparationSettings {
 }
 
 impl PreparationSettings {
-    pub fn of(args: &RecoverArgs) -> Self {
+    pub fn of(options: &RecoveryOptions) -> Self {
         Self {
-            method: args.method(),
+            method: options.method(),
             fallback: None,
-            window: args.window,
-            trust: args.trust,
-            is_registered: !args.no_register,
+            window: options.window,
+            trust: options.trust,
+            is_registered: !options.no_register,
         }
     }
 }
@@ -125,7 +125,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     pub fn run(
         &self,
         sample: CaptureSample<S::Dark>,
-        args: &RecoverArgs,
+        options: &RecoveryOptions,
     ) -> Result<PreparedCapture<S::Dark>> {
         let mut findings = Findings::printed();
         let Attempt {
@@ -141,15 +141,15 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
         };
         findings.add(messages::preparation(&prepared));
         let snr = prepared.expected_snr();
-        let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !args.force);
+        let unusable = snr.filter(|snr| *snr < MIN_USABLE_SNR && !options.force);
         match (cause, unusable) {
-            (Some(cause), Some(_)) if !args.strict => {
+            (Some(cause), Some(_)) if !options.strict => {
                 let message = format!("{}; --force writes the file nevertheless", cause.message);
                 bail!(FaultyPhotographsError(message))
             }
             (cause, _) => findings.add(cause),
         }
-        findings.check(args.strict)?;
+        findings.check(options.strict)?;
         match unusable {
             Some(snr) => bail!(UnusableError(snr)),
             None => Ok(PreparedCapture {

@@ -1,14 +1,21 @@
 //! The result of `ltm-export recover`.
 
+use std::path::Path;
+use std::time::Instant;
+
 use anyhow::Result;
 use serde::Serialize;
 
-use super::args::RecoverArgs;
 use super::calibration::EstimatedField;
-use crate::capture::{CaptureFolder, Manifest, NoiseModel};
+use super::inputs::RecoveryInputs;
+use super::ltm_writer::WrittenFile;
+use super::prepared_job::PreparedJob;
+use super::tile_recovery::TileCounts;
+use crate::capture::{Manifest, NoiseModel};
 use crate::cli::finding::Finding;
+use crate::cli::process_resources::peak_rss_bytes;
 use crate::cli::report::{format_bytes, format_shots, print_line};
-use crate::export::MIN_PLAUSIBLE_SNR;
+use crate::export::{MIN_PLAUSIBLE_SNR, Provenance};
 use crate::recover::{
     CommonModeWeight, MOVED_CODE, Method, PhotographCorrection, PhotographFault, PreparedRecovery,
     SparsityBasis,
@@ -78,12 +85,12 @@ pub struct PhotographReport {
 
 /// Reports of the photographs of `shots`, and of the `moved` ones that were left out before.
 pub fn photograph_reports(
-    folder: &CaptureFolder,
+    manifest: &Manifest,
     shots: &[usize],
     recovery: &PreparedRecovery,
     moved: &[usize],
 ) -> Vec<PhotographReport> {
-    let listed = &folder.manifest().shots;
+    let listed = &manifest.shots;
     let left_out = |&shot: &usize| PhotographReport {
         shot,
         photo: listed[shot].photo.clone(),
@@ -116,10 +123,53 @@ pub fn photograph_reports(
 }
 
 impl RecoverReport {
-    pub fn print(&self, args: &RecoverArgs, manifest: &Manifest) -> Result<()> {
+    /// Of a recovery that began at `start`.
+    pub fn new(
+        start: Instant,
+        inputs: &RecoveryInputs<'_>,
+        job: &PreparedJob,
+        counts: TileCounts,
+        written: &WrittenFile,
+    ) -> Self {
+        let (recovery, findings) = (&job.recovery, &job.findings);
+        let method = inputs.options.method();
+        Self {
+            seconds: start.elapsed().as_secs_f64(),
+            peak_rss_bytes: peak_rss_bytes(),
+            method,
+            basis: method.basis(),
+            window: recovery.geometry().window.side(),
+            leak: job.leak,
+            rank: job.rank(),
+            patterns: Provenance::new(&job.manifest, &inputs.shots).patterns,
+            photographs: job.shots.len(),
+            expected_snr_db: job.expected_snr(),
+            file_snr_db: written.snr,
+            common_mode: recovery.common_mode(),
+            noise: job.noise,
+            strips: counts.strips,
+            saturated_samples: job.codes.saturated,
+            overexposed_pixels: counts.overexposed,
+            hot_pixels: counts.defects.hot,
+            dead_pixels: counts.defects.dead,
+            estimated_fields: findings.estimated_fields.clone(),
+            file_bytes: written.bytes,
+            levels: inputs.levels,
+            photograph_reports: photograph_reports(
+                &job.manifest,
+                &job.shots,
+                recovery,
+                &findings.moved_shots,
+            ),
+            warnings: findings.warnings().cloned().collect(),
+        }
+    }
+
+    /// `output` is the file that was written, and `manifest` that of the capture.
+    pub fn print(&self, output: &Path, manifest: &Manifest) -> Result<()> {
         print_line(&format!(
             "{}: {} camera pixels, {} light elements, window {}, from {} in {:.1} s, {}",
-            args.output.display(),
+            output.display(),
             manifest.camera.extent(),
             manifest.light.extent(),
             self.window,

@@ -3,6 +3,8 @@
 //! Its measurements are fitted by regression on what they could be: the prediction for its own pattern, the photograph of
 //! another pattern, both together, or the brightness of the object alone.
 
+use serde::{Deserialize, Serialize};
+
 use super::equations::{for_largest_window, predict};
 use super::window_covariance::WindowModel;
 use crate::job_executor::{Cancelled, Executor, PARTS, share_of_jobs};
@@ -27,7 +29,7 @@ const FIRST_PHOTOGRAPH: usize = 2;
 pub const MOVED_CODE: &str = "photograph-moved";
 
 /// Why a photograph does not belong to its capture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum PhotographFault {
     /// It shows the pattern of another photograph.
     PatternOf {

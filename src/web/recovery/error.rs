@@ -1,6 +1,5 @@
 //! Codes and messages of errors of recoveries.
 
-use crate::export::TooLittleMemory;
 use crate::recover::RecoverError;
 use crate::transport::GeometryError;
 use crate::web::CodedError;
@@ -48,15 +47,5 @@ impl From<RecoverError> for CodedError {
 impl From<GeometryError> for CodedError {
     fn from(error: GeometryError) -> Self {
         with_remedy("recover-geometry", &error, "")
-    }
-}
-
-impl From<TooLittleMemory> for CodedError {
-    fn from(TooLittleMemory { limit, min }: TooLittleMemory) -> Self {
-        let [limit, min] = [limit >> 20, min.div_ceil(1 << 20)];
-        let message = format!(
-            "a memory limit of {limit} MiB is too little for this capture; it takes at least {min} MiB"
-        );
-        Self::new("recover-memory", message)
     }
 }

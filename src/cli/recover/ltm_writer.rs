@@ -1,0 +1,140 @@
+//! Encodes recovered tiles and writes the `.ltm` file.
+
+use std::fs::File;
+use std::io::{self, ErrorKind};
+use std::path::Path;
+
+use anyhow::{Error, Result};
+
+use super::inputs::encoders;
+use super::prepared_job::PreparedJob;
+use crate::cli::levels_output::{temporary_spool, write_levels};
+use crate::cli::output_file::{LTM, OutputFile};
+use crate::cli::process_resources::{InterruptibleCores, thread_pool};
+use crate::cli::progress;
+use crate::export::{self, FileQuality, MemoryPlan};
+use crate::format::{EncodedFile, FormatError, Metadata, SpooledChunks};
+use crate::job_executor::Cancelled;
+use crate::pyramid::PyramidLayout;
+use crate::transport::Decibels;
+
+/// Share of the bytes that the finest of several levels usually takes.
+const LEVEL_0_SHARE: f64 = 0.75;
+/// Share of the bytes that would fit in the next attempt.
+const RETRY_SHARE: f64 = 0.98;
+
+/// Reads the record of a tile.
+pub type ReadTile<'a> = dyn Fn(usize) -> io::Result<Vec<u8>> + Sync + 'a;
+
+/// Writes the file of a recovery.
+pub struct LtmWriter<'a> {
+    pub output: &'a Path,
+    pub job: &'a PreparedJob,
+    pub quality: FileQuality,
+    /// Number of levels of the file.
+    pub levels: u32,
+    pub plan: &'a MemoryPlan,
+    pub cores: &'a InterruptibleCores,
+    /// What an error advises after the tiles are recovered.
+    pub too_large_remedy: &'static str,
+}
+
+/// A file that was written.
+pub struct WrittenFile {
+    pub bytes: u64,
+    /// SNR relative to the tiles.
+    pub snr: Option<Decibels>,
+}
+
+impl LtmWriter<'_> {
+    /// Encodes the tiles that `record` reads, and writes the file. An interruption is reported as [`Cancelled`].
+    pub fn write(&self, metadata: &Metadata, record: &ReadTile<'_>) -> Result<WrittenFile> {
+        let window = self.job.recovery.geometry().window;
+        let rank = self.job.rank().unwrap_or(0);
+        let encoders = encoders(self.plan, self.levels, window, rank)?;
+        thread_pool(encoders)?.install(|| self.write_within_limit(metadata, record))
+    }
+
+    fn write_within_limit(
+        &self,
+        metadata: &Metadata,
+        record: &ReadTile<'_>,
+    ) -> Result<WrittenFile> {
+        let _spinner = progress::spinner("compressing");
+        let levels = self.levels;
+        let mut quality = self.quality;
+        let max_bytes = match quality {
+            FileQuality::MaxBytes(bytes) => bytes,
+            _ => u64::MAX,
+        };
+        if levels > 1 && max_bytes < u64::MAX {
+            quality = FileQuality::MaxBytes((LEVEL_0_SHARE * max_bytes as f64) as u64);
+        }
+        loop {
+            let file = self.encode(record, metadata.clone(), quality);
+            let file = file.map_err(|error| self.writing_error(error, max_bytes))?;
+            let output = OutputFile::create(self.output, &LTM)?;
+            let written = output.finish(|out| match levels {
+                1 => Ok(file.write(out)?),
+                _ => {
+                    let layout = PyramidLayout {
+                        max_bytes,
+                        ..PyramidLayout::of_levels(levels)
+                    };
+                    let fetch = |chunk| Ok(file.chunk(chunk)?.into_owned());
+                    write_levels(self.output, file.index(), &fetch, layout, self.cores, out)?;
+                    Ok(())
+                }
+            });
+            let error = match written {
+                Ok(bytes) => {
+                    return Ok(WrittenFile {
+                        bytes,
+                        snr: file.snr(),
+                    });
+                }
+                Err(error) => error,
+            };
+            match error.downcast::<FormatError>() {
+                // Coarser levels took more than their usual share.
+                Ok(FormatError::TooLarge { limit, smallest }) => {
+                    let fitting = file.bytes() as f64 * limit as f64 / smallest as f64;
+                    quality = FileQuality::MaxBytes((RETRY_SHARE * fitting) as u64);
+                }
+                Ok(error) => return Err(self.writing_error(error, max_bytes)),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Encodes the tiles as a file of one level, whose chunks are in a temporary file.
+    fn encode(
+        &self,
+        record: &ReadTile<'_>,
+        metadata: Metadata,
+        quality: FileQuality,
+    ) -> Result<EncodedFile<SpooledChunks<File>>, FormatError> {
+        let new_store = || temporary_spool(self.output).map(SpooledChunks::new);
+        let recovery = &self.job.recovery;
+        export::encode_file(recovery, record, metadata, quality, self.cores, new_store)
+    }
+
+    /// The error with the name of the output; `max_bytes` is what the user asked for.
+    fn writing_error(&self, error: FormatError, max_bytes: u64) -> Error {
+        let output = self.output.display();
+        match error {
+            FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
+            FormatError::TooLarge { limit, smallest } => {
+                // A file of several levels has a smaller limit for the finest one.
+                let smallest =
+                    (smallest as f64 * max_bytes as f64 / limit.max(1) as f64).ceil() as u64;
+                let limit = max_bytes;
+                Error::new(FormatError::TooLarge { limit, smallest }).context(format!(
+                    "{output}: cannot be written; {}",
+                    self.too_large_remedy
+                ))
+            }
+            other => Error::new(other).context(output.to_string()),
+        }
+    }
+}

@@ -1,0 +1,308 @@
+//! `ltm-export stage`: the stages of a recovery one by one, for several machines.
+//!
+//! ```text
+//! capture ── plan ── plan.json ── learn ── learned.bin ─┬─ tiles 1/n ── shards/1-of-n.pack ─┬─ assemble ── .ltm
+//!                                                       ├─ tiles 2/n ── shards/2-of-n.pack ─┤
+//!                                                       ⋮                                   ⋮
+//! ```
+//!
+//! `recover` is the same stages in one process. Every stage may be repeated: a file that is complete and follows from its
+//! inputs stays, any other is written under a temporary name and renamed. Each names what it follows from, so that files of
+//! another plan are told.
+
+mod learned_file;
+mod partial_shards;
+mod plan;
+mod shard;
+mod shard_pack;
+mod stage_folder;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+pub use self::stage_folder::StageFileError;
+
+use self::learned_file::LearnedFile;
+use self::partial_shards::PartialShard;
+use self::plan::{Comparison, RecoveryPlan};
+use self::shard::Shard;
+use self::shard_pack::ShardPacks;
+use self::stage_folder::StageFolder;
+use super::output_file::{LTM, OutputFile};
+use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
+use super::recover::args::{DEFAULT_MEMORY, RecoveryOptions};
+use super::recover::capture_sample::SampleSource;
+use super::recover::inputs::RecoveryInputs;
+use super::recover::job::add_findings_of_tiles;
+use super::recover::ltm_writer::LtmWriter;
+use super::recover::prepared_job::PreparedJob;
+use super::recover::report::RecoverReport;
+use super::recover::tile_recovery::{TilePhotographs, TileRecovery};
+use super::report::{print_json, print_line};
+use super::value_parsers::ByteCount;
+use crate::capture::CaptureFolder;
+use crate::job_executor::Cancelled;
+
+/// What to do after a `--max-bytes` that is too low.
+const TOO_LARGE_REMEDY: &str =
+    "repeat the stages with a plan of a larger --max-bytes, or without --max-bytes";
+
+/// Recover a capture stage by stage, on several machines
+#[derive(Debug, Args)]
+pub struct StageArgs {
+    #[command(subcommand)]
+    stage: Stage,
+}
+
+#[derive(Debug, Subcommand)]
+enum Stage {
+    Plan(PlanArgs),
+    Learn(LearnArgs),
+    Tiles(TilesArgs),
+    Assemble(AssembleArgs),
+}
+
+/// Write plan.json: the options of a recovery, and what identifies its photographs
+#[derive(Debug, Args)]
+struct PlanArgs {
+    /// Capture folder: capture.json and the files it names
+    capture: PathBuf,
+    /// Folder of the stages' files; created if missing
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    #[command(flatten)]
+    options: RecoveryOptions,
+}
+
+/// Learn from a sample of the photographs what all tiles need, and write learned.bin
+#[derive(Debug, Args)]
+struct LearnArgs {
+    #[command(flatten)]
+    folders: Folders,
+    /// Limit on memory
+    #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
+    memory: ByteCount,
+}
+
+/// Recover one of several shards of the picture, and write shards/I-of-N.pack
+#[derive(Debug, Args)]
+struct TilesArgs {
+    #[command(flatten)]
+    folders: Folders,
+    /// Which of how many shards: 1/16 to 16/16
+    #[arg(long, value_name = "I/N", value_parser = Shard::parse)]
+    shard: Shard,
+    /// Limit on memory; photographs that do not fit are read in strips
+    #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
+    memory: ByteCount,
+}
+
+/// Encode the tiles of all shards and write the file
+#[derive(Debug, Args)]
+struct AssembleArgs {
+    #[command(flatten)]
+    folders: Folders,
+    /// Number of shards
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(shard::MAX_SHARDS)))]
+    shards: u32,
+    /// File to write
+    #[arg(short, long, value_name = "FILE.ltm")]
+    output: PathBuf,
+    /// Limit on memory
+    #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
+    memory: ByteCount,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+struct Folders {
+    /// Folder of the stages' files, with plan.json
+    folder: PathBuf,
+    /// Capture folder, where it is not at the path in plan.json
+    #[arg(long, value_name = "CAPTURE")]
+    capture: Option<PathBuf>,
+}
+
+pub fn run(args: &StageArgs) -> Result<()> {
+    if let Stage::Plan(args) = &args.stage {
+        args.options.check()?;
+    }
+    let cores = InterruptibleCores::listen()?;
+    let result = match &args.stage {
+        Stage::Plan(args) => plan(args, &cores),
+        Stage::Learn(args) => learn(args, &cores),
+        Stage::Tiles(args) => tiles(args, &cores),
+        Stage::Assemble(args) => assemble(args, &cores),
+    };
+    result.map_err(|error| match error.is::<Cancelled>() {
+        true => Interrupted("interrupted; the same command begins this stage again".into()).into(),
+        false => error,
+    })
+}
+
+/// Whether a file of a stage is as it is to be. It is not if that is said by a [`StageFileError`]: any other error may pass.
+fn is_complete<T>(read: Result<T>) -> Result<bool> {
+    match read {
+        Ok(_) => Ok(true),
+        Err(error) if error.is::<StageFileError>() => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// A plan, and the capture that it is of.
+struct PlannedCapture {
+    stages: StageFolder,
+    plan: RecoveryPlan,
+    capture: CaptureFolder,
+}
+
+impl Folders {
+    /// Reads the plan and opens its capture.
+    ///
+    /// # Errors
+    /// If either cannot be read, and if the capture has changed since.
+    fn open(&self, comparison: Comparison) -> Result<PlannedCapture> {
+        let stages = StageFolder::new(&self.folder);
+        let plan = RecoveryPlan::read(&stages)?;
+        let capture = self.capture.as_ref().unwrap_or(&plan.capture);
+        let capture = CaptureFolder::open(capture)?;
+        plan.check(&stages, &capture, comparison)?;
+        Ok(PlannedCapture {
+            stages,
+            plan,
+            capture,
+        })
+    }
+}
+
+fn plan(args: &PlanArgs, cores: &InterruptibleCores) -> Result<()> {
+    let capture = CaptureFolder::open(&args.capture)?;
+    let inputs = RecoveryInputs::new(&capture, &args.options)?;
+    let stages = StageFolder::create(&args.output)?;
+    let plan = RecoveryPlan::new(&inputs, cores)?;
+    plan.write(&stages)?;
+    let (path, rows) = (stages.plan(), inputs.file_tile_rows());
+    print_line(&format!(
+        "{}: {} files of {}, to recover in at most {rows} shards",
+        path.display(),
+        plan.file_count(),
+        capture.root().display(),
+    ))
+}
+
+fn learn(args: &LearnArgs, cores: &InterruptibleCores) -> Result<()> {
+    let PlannedCapture {
+        stages,
+        plan,
+        capture,
+    } = args.folders.open(Comparison::Contents)?;
+    let inputs = RecoveryInputs::new(&capture, &plan.options)?;
+    if is_complete(LearnedFile::read(&stages, &plan, &inputs))? {
+        return print_line(&format!("{}: is complete", stages.learned().display()));
+    }
+    let memory = inputs.memory_plan(args.memory)?;
+    let source = SampleSource {
+        plan: &memory,
+        cores,
+    };
+    let learn = || PreparedJob::learn(&inputs, source, || Ok(()), |_| Ok(()));
+    let (job, _) = thread_pool(memory.tiles_at_once())?.install(learn)?;
+    let snr = job.expected_snr();
+    LearnedFile::write(&stages, &plan, &job)?;
+    let snr = snr.map_or(String::new(), |snr| {
+        format!(", predicts held-out patterns to {snr}")
+    });
+    print_line(&format!("{}: learned{snr}", stages.learned().display()))
+}
+
+fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
+    let PlannedCapture {
+        stages,
+        plan,
+        capture,
+    } = args.folders.open(Comparison::Lengths)?;
+    // Copies of folders may lack empty ones.
+    StageFolder::create(&args.folders.folder)?;
+    let inputs = RecoveryInputs::new(&capture, &plan.options)?;
+    let LearnedFile { id, job } = LearnedFile::read(&stages, &plan, &inputs)?;
+    let key = args.shard.key(&id, job.recovery.geometry());
+    let path = stages.pack(args.shard);
+    let print_complete = || print_line(&format!("{}: is complete", path.display()));
+    let sink = PartialShard::open(&stages, args.shard, &key)?;
+    if is_complete(shard_pack::verify(&path, &key))? {
+        sink.remove()?;
+        return print_complete();
+    }
+    let memory = inputs.memory_plan(args.memory)?;
+    sink.print_count();
+    let source = SampleSource {
+        plan: &memory,
+        cores,
+    };
+    let recover = || {
+        let photographs = TilePhotographs::of_capture(&capture, &job)?;
+        let recovery = TileRecovery { job: &job, source };
+        recovery.run(photographs, key.tile_rows(), &sink)
+    };
+    let finished = thread_pool(memory.tiles_at_once())?
+        .install(recover)
+        .and_then(|counts| {
+            // A plan that has changed meanwhile has packs of its own.
+            let plan = RecoveryPlan::read(&stages)?;
+            let current = LearnedFile::read(&stages, &plan, &inputs)?;
+            stages.check_learned(&id, &current.id)?;
+            shard_pack::write(&path, &key, counts, |tile| sink.read(tile))
+        });
+    if let Err(error) = finished {
+        // Another process may have finished the shard, and removed the partial packs.
+        return match shard_pack::verify(&path, &key) {
+            Ok(()) => print_complete(),
+            Err(_) => Err(sink.explain(error)),
+        };
+    }
+    sink.remove()?;
+    print_line(&format!(
+        "{}: {} tiles of shard {}",
+        path.display(),
+        key.tiles.len(),
+        args.shard
+    ))
+}
+
+fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
+    let start = Instant::now();
+    drop(OutputFile::create(&args.output, &LTM)?);
+    let PlannedCapture {
+        stages,
+        plan,
+        capture,
+    } = args.folders.open(Comparison::Manifest)?;
+    let inputs = RecoveryInputs::new(&capture, &plan.options)?;
+    let LearnedFile { id, mut job } = LearnedFile::read(&stages, &plan, &inputs)?;
+    job.findings.print_further();
+    let memory = inputs.memory_plan(args.memory)?;
+    let packs = ShardPacks::open(&stages, &id, job.recovery.geometry(), args.shards)?;
+    add_findings_of_tiles(&mut job, packs.counts());
+    job.findings.check(plan.options.strict)?;
+    let writer = LtmWriter {
+        output: &args.output,
+        job: &job,
+        quality: plan.options.quality(),
+        levels: inputs.levels,
+        plan: &memory,
+        cores,
+        too_large_remedy: TOO_LARGE_REMEDY,
+    };
+    let metadata = job.metadata(&inputs.shots, plan.options.method())?;
+    let written = writer.write(&metadata, &|i| packs.read(i))?;
+    let report = RecoverReport::new(start, &inputs, &job, packs.counts(), &written);
+    match args.json {
+        true => print_json(&report),
+        false => report.print(&args.output, capture.manifest()),
+    }
+}

@@ -1,0 +1,120 @@
+//! The folder that the stages of a recovery share.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use super::shard::Shard;
+use crate::cli::recover::checkpoint_key::PROGRAM;
+
+/// A file of another stage that is missing, damaged or of other photographs.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {problem}", path.display())]
+pub struct StageFileError {
+    pub path: PathBuf,
+    pub problem: StageFileProblem,
+}
+
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum StageFileProblem {
+    #[error("is missing; {0} writes it")]
+    Missing(String),
+    #[error("is incomplete or damaged; {0} writes it again")]
+    Damaged(String),
+    #[error("is not of this {made_from}; {remedy} writes it again")]
+    Foreign {
+        made_from: &'static str,
+        remedy: String,
+    },
+    #[error("was replaced while a shard was recovered from it; recover the shard again")]
+    Replaced,
+    #[error("was written by {0}, and this is {PROGRAM}; use one version for all stages")]
+    OtherProgram(String),
+    #[error("{0} has changed since; \"ltm-export stage plan\" plans the recovery anew")]
+    ChangedCapture(String),
+}
+
+impl StageFileError {
+    /// Whether another stage may still write the file.
+    pub fn is_missing(&self) -> bool {
+        matches!(self.problem, StageFileProblem::Missing(_))
+    }
+}
+
+impl StageFileProblem {
+    /// With the path of the file.
+    pub fn of(self, path: &Path) -> StageFileError {
+        StageFileError {
+            path: path.to_owned(),
+            problem: self,
+        }
+    }
+}
+
+/// The folder.
+pub struct StageFolder(PathBuf);
+
+impl StageFolder {
+    pub fn new(path: &Path) -> Self {
+        Self(path.to_owned())
+    }
+
+    /// Creates it, and the folder of its shards.
+    pub fn create(path: &Path) -> Result<Self> {
+        let folder = Self::new(path);
+        let shards = folder.shards();
+        std::fs::create_dir_all(&shards).with_context(|| {
+            format!(
+                "{}: cannot be created; may you write there?",
+                shards.display()
+            )
+        })?;
+        Ok(folder)
+    }
+
+    pub fn plan(&self) -> PathBuf {
+        self.0.join("plan.json")
+    }
+
+    pub fn learned(&self) -> PathBuf {
+        self.0.join("learned.bin")
+    }
+
+    pub fn shards(&self) -> PathBuf {
+        self.0.join("shards")
+    }
+
+    /// The command of a stage, with its other `options`.
+    pub fn command(&self, stage: &str, options: &str) -> String {
+        format!("\"ltm-export stage {stage} {}{options}\"", self.0.display())
+    }
+
+    /// Whether what is learned now, by its id, is what a shard was recovered with.
+    ///
+    /// # Errors
+    /// [`StageFileError`] if it is not.
+    pub fn check_learned(&self, used: &str, current: &str) -> Result<(), StageFileError> {
+        match used == current {
+            true => Ok(()),
+            false => Err(StageFileProblem::Replaced.of(&self.learned())),
+        }
+    }
+
+    /// Reads a file of another stage; `remedy` is the command that writes it.
+    ///
+    /// # Errors
+    /// If it is missing or cannot be read.
+    pub fn read(&self, path: &Path, remedy: &str) -> Result<Vec<u8>> {
+        match std::fs::read(path) {
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                Err(StageFileProblem::Missing(remedy.to_owned()).of(path).into())
+            }
+            bytes => bytes.with_context(|| path.display().to_string()),
+        }
+    }
+
+    pub fn pack(&self, shard: Shard) -> PathBuf {
+        self.shards().join(format!("{}.pack", shard.file_stem()))
+    }
+}
