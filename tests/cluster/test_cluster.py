@@ -1,0 +1,339 @@
+"""Tests of the workflow: a collection, captures in shards, and a real Slurm of two nodes on this machine.
+
+Run by `pkg-scripts/test --cluster`. LTM_EXPORT names the program.
+"""
+
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+from two_node_slurm import SlurmUnavailable, TwoNodeSlurm, wait_until
+
+REPO = Path(__file__).resolve().parents[2]
+PROGRAM = os.environ.get("LTM_EXPORT", str(REPO / "target/release/ltm-export"))
+# Fast, as the recovery itself has tests of its own.
+OPTIONS = "--method nnls --window 7"
+SLURM = ["--profile", str(REPO / "workflow/profiles/slurm"), "--default-resources", "slurm_partition=main"]
+SLURM += ["--slurm-no-account", "--slurm-status-command", "squeue"]
+SLURM += ["--slurm-init-seconds-before-status-checks", "3", "--latency-wait", "20"]
+SECONDS = 300
+
+sys.path.insert(0, str(REPO / "workflow/scripts"))
+from captures import CollectionError, read_collection  # noqa: E402
+from write_page import page  # noqa: E402
+
+
+def ltm_export(*args):
+    """Runs the program."""
+    subprocess.run([PROGRAM, *map(str, args)], check=True, capture_output=True, timeout=SECONDS)
+
+
+def simulate(folder, seed, camera="64x64"):
+    """Makes a small capture."""
+    size = ["--camera", camera, "--light", "16x16", "--patterns", "40", "--seed", seed]
+    ltm_export("simulate", "stained-glass", "-o", folder, *size)
+
+
+class WorkflowTest(unittest.TestCase):
+    """A folder with captures, made once for each class, and one for results."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
+        cls.captures = cls.folder / "captures"
+        cls.captures.mkdir()
+        cls.results = cls.folder / "results"
+
+    def command(self, *options):
+        """The command that recovers the captures."""
+        config = ["--config", f"options={OPTIONS}", "memory_mb=1000", "shards=3", "shard_pixels=10000"]
+        return [str(REPO / "pkg-scripts/cluster"), str(self.captures), "-o", str(self.results), *options, *config]
+
+    def workflow(self, *options, status=0, program=PROGRAM):
+        """Recovers the captures. Returns the jobs that ran, as their messages name them, in order."""
+        command = ["timeout", "-k", "5", str(SECONDS), *self.command(*options)]
+        environment = os.environ | {"LTM_EXPORT": str(program)}
+        ended = subprocess.run(command, env=environment, capture_output=True, text=True)
+        self.assertEqual(ended.returncode, status, ended.stdout[-3000:] + ended.stderr[-6000:])
+        jobs = re.findall(r"^ *Job \d+: (.+)$", ended.stderr + ended.stdout, re.MULTILINE)
+        return sorted(job for job in jobs if job != "write the page of results")
+
+    def report(self):
+        """The rows of report.csv by name."""
+        with open(self.results / "report.csv", encoding="utf-8", newline="") as file:
+            return {row["name"]: row for row in csv.DictReader(file)}
+
+    def assert_recovered(self, *names):
+        """Checks that files have the bytes of `ltm-export recover`."""
+        for name in names:
+            alone = self.folder / f"{name}-alone.ltm"
+            if not alone.exists():
+                ltm_export("recover", self.captures / name, "-o", alone, *OPTIONS.split())
+            self.assertEqual((self.results / f"{name}.ltm").read_bytes(), alone.read_bytes(), name)
+
+
+class CollectionTest(WorkflowTest):
+    """A collection on this machine."""
+
+    def test_a_broken_capture_is_reported_and_runs_alone_when_repaired(self):
+        for seed in range(1, 5):
+            simulate(self.captures / f"window {seed}", seed)
+        photograph = self.captures / "window 2/photos/0005.png"
+        intact = shutil.copy2(photograph, self.folder)
+        photograph.write_bytes(photograph.read_bytes()[:1000])
+
+        whole = ["window 1", "window 3", "window 4"]
+        self.assertEqual(self.workflow(), [f"window {i}: recover" for i in range(1, 5)])
+        self.assert_recovered(*whole)
+        broken = self.report()["window 2"]
+        self.assertEqual((broken["status"], broken["exit_status"]), ("failed", "65"))
+        self.assertIn(str(photograph), broken["error"])
+        self.assertIn("photos/0005.png", (self.results / "index.html").read_text(encoding="utf-8"))
+        for name in whole:
+            row = self.report()[name]
+            self.assertEqual((row["status"], row["exit_status"], row["error"]), ("recovered", "0", ""))
+            self.assertGreater(float(row["snr_db"]), 5)
+            self.assertTrue((self.results / f"{name}.png").exists())
+
+        self.assertEqual(self.workflow(), [], "a capture at fault is not repeated")
+        # With its old date, as a copy from a camera has.
+        shutil.copy2(intact, photograph)
+        self.assertEqual(self.workflow(), ["window 2: recover"])
+        self.assert_recovered("window 2")
+        self.assertEqual(self.report()["window 2"]["status"], "recovered")
+
+        (self.results / "window 3.ltm").unlink()
+        self.assertEqual(self.workflow(), ["window 3: recover"], "a deleted file is made again")
+        self.assert_recovered("window 3")
+
+
+# Stands for a disk that is full: c1 fails once, and c2 until there is a file "space".
+FULL_DISK = """#!/bin/sh
+case "$1 $2" in
+  "recover "*/c[12])
+    echo "$2" >>tries
+    if [ "${2##*/}" = c1 ]; then most=1; else most=99; fi
+    if [ ! -e space ] && [ "$(grep -c "$2" tries)" -le $most ]; then
+      echo "error: disk full" >&2
+      exit 75
+    fi
+    ;;
+esac
+exec PROGRAM "$@"
+"""
+
+
+class TemporaryFailureTest(WorkflowTest):
+    """Failures that may pass."""
+
+    def test_exit_status_75_is_repeated_and_then_left_to_the_next_run(self):
+        for seed in (1, 2, 3):
+            simulate(self.captures / f"c{seed}", seed)
+        program = self.folder / "ltm-export"
+        program.write_text(FULL_DISK.replace("PROGRAM", PROGRAM), encoding="utf-8")
+        program.chmod(0o755)
+        self.workflow(status=1, program=program)
+        tries = (self.results / "tries").read_text(encoding="utf-8").split()
+        self.assertEqual([tries.count(str(self.captures / name)) for name in ("c1", "c2")], [2, 3])
+        self.assert_recovered("c1", "c3")
+        row = self.report()["c2"]
+        self.assertEqual((row["status"], row["exit_status"], row["error"]), ("unfinished", "75", "disk full"))
+
+        (self.results / "space").touch()
+        self.assertEqual(self.workflow(program=program), ["c2: recover"])
+        self.assert_recovered("c2")
+        self.assertEqual(self.report()["c2"]["status"], "recovered")
+
+
+class KilledDriverTest(WorkflowTest):
+    """The end of Snakemake itself."""
+
+    def test_after_kill_9_only_unfinished_captures_run(self):
+        for seed in range(1, 7):
+            simulate(self.captures / f"c{seed}", seed)
+        run = subprocess.Popen(self.command(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        wait_until(lambda: len(list(self.results.glob("*.result.json"))) >= 2, SECONDS)
+        # pkg-scripts/cluster has become Snakemake.
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+        wait_until(lambda: not commands_on(self.captures), 30)
+        finished = {path.name.split(".")[0] for path in self.results.glob("*.result.json")}
+        self.assertLess(len(finished), 6)
+        ran = {job.split(":")[0] for job in self.workflow()}
+        # Snakemake does not know of a job that ended as it was killed, so that it runs again.
+        self.assertLessEqual(len(ran & finished), 2)
+        self.assertEqual(ran | finished, {f"c{seed}" for seed in range(1, 7)})
+        self.assertLess(len(ran), 6)
+        self.assert_recovered("c1", "c6")
+
+
+class ShardsTest(WorkflowTest):
+    """A capture in shards on this machine."""
+
+    def test_shards_give_the_bytes_of_recover(self):
+        simulate(self.captures / "large", 1, "128x128")
+        stages = ["assemble", "learn", "plan", *(f"recover tiles {i} of 3" for i in range(1, 4))]
+        self.assertEqual(self.workflow(), [f"large: {stage}" for stage in stages])
+        self.assert_recovered("large")
+        self.assertFalse((self.results / "stages/large").exists())
+        self.assertEqual(self.workflow(), [])
+
+    def test_a_fault_in_a_stage_is_the_captures(self):
+        capture = self.captures / "at fault"
+        simulate(capture, 2, "128x128")
+        photograph = capture / "photos/0003.png"
+        intact = shutil.copy2(photograph, self.folder)
+        photograph.write_bytes(photograph.read_bytes()[:1000])
+        self.workflow()
+        row = self.report()["at fault"]
+        self.assertEqual((row["status"], row["exit_status"]), ("failed", "65"))
+        self.assertIn("photos/0003.png", row["error"])
+        self.assertEqual(self.workflow(), [])
+        shutil.copy2(intact, photograph)
+        self.workflow()
+        self.assert_recovered("at fault")
+
+
+class DriverTest(unittest.TestCase):
+    """run_command.py: what is repeated, and what is not."""
+
+    def run_script(self, script, *options):
+        """Runs a shell script as a job. Returns the job's exit status and the folder with its files."""
+        folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
+        self.addCleanup(shutil.rmtree, folder)
+        files = ["--result", folder / "result.json", "--temporary", folder / "temporary.json", "--log", folder / "log"]
+        command = [sys.executable, REPO / "workflow/scripts/run_command.py", "--name", "x", *files, *options]
+        command += ["--", "sh", "-c", script]
+        return subprocess.run(list(map(str, command)), timeout=60).returncode, folder
+
+    def test_permanent_failures_are_results(self):
+        for status in (1, 2, 65):
+            ended, folder = self.run_script(f"echo 'error: x.png: is cut off' >&2; exit {status}")
+            result = json.loads((folder / "result.json").read_text())
+            self.assertEqual((ended, result["status"], result["exit_status"]), (0, "failed", status))
+            self.assertEqual(result["error"], "x.png: is cut off")
+
+    def test_a_checkpoint_of_other_options_is_given_up(self):
+        checkpoint = Path(tempfile.mkdtemp(prefix="cluster-test-")) / "x.ltm.checkpoint"
+        self.addCleanup(shutil.rmtree, checkpoint.parent)
+        checkpoint.touch()
+        ended, folder = self.run_script(f"test ! -e '{checkpoint}'", "--checkpoint", checkpoint)
+        result = json.loads((folder / "result.json").read_text())
+        self.assertEqual((ended, result["status"]), (0, "done"))
+
+    def test_temporary_failures_fail_the_job(self):
+        for script, status in (("exit 75", 75), ("exit 130", 130), ("kill -9 $$", -9)):
+            ended, folder = self.run_script(script)
+            self.assertNotEqual(ended, 0)
+            self.assertFalse((folder / "result.json").exists())
+            result = json.loads((folder / "temporary.json").read_text())
+            self.assertEqual(result["exit_status"], status)
+
+
+class CollectionFileTest(unittest.TestCase):
+    """The list of captures."""
+
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def test_a_csv_file_names_captures_with_options(self):
+        path = self.folder / "list.csv"
+        path.write_text("name,capture,options\nb,shoot 2,--quality 40\na,../a,\n", encoding="utf-8")
+        first, second = read_collection(path)
+        self.assertEqual((first.name, first.folder), ("a", (self.folder.parent / "a").resolve()))
+        self.assertEqual((second.folder.name, second.options), ("shoot 2", "--quality 40"))
+
+    def test_errors_name_the_line_and_the_field(self):
+        path = self.folder / "list.csv"
+        cases = {
+            "name,folder\na,b\n": "the first line must name the columns",
+            "name,capture\n": "names no capture",
+            "name,capture\n../a,b\n": "line 2: name: '../a'",
+            "name,capture\na,b\na,c\n": "line 3: name: a is there twice",
+            "name,capture\na\n": "line 2: has not as many fields",
+            "name,capture\na,\n": "line 2: capture: is empty",
+            "name,capture,options\na,b,'\n": "line 2: options: No closing quotation",
+        }
+        for text, message in cases.items():
+            path.write_text(text, encoding="utf-8")
+            with self.assertRaisesRegex(CollectionError, re.escape(message)):
+                read_collection(path)
+
+
+class PageTest(unittest.TestCase):
+    """The page under a strict content security policy."""
+
+    def test_the_page_has_no_inline_code(self):
+        row = {"name": "<b>", "status": "failed", "exit_status": 65, "error": 'a "photo"', "warnings": []}
+        row |= {"snr_db": None, "bytes": None, "seconds": 1.0, "file": None, "picture": None}
+        html = page([row])
+        self.assertIn("&lt;b&gt;", html)
+        self.assertNotRegex(html, r"<script(?![^>]*src=)|<style| style=| on\w+=|<b>")
+
+
+class SlurmTest(WorkflowTest):
+    """Slurm with two nodes, on this machine."""
+
+    def setUp(self):
+        slurm = TwoNodeSlurm(self.folder / "slurm")
+        self.addCleanup(slurm.stop)
+        try:
+            slurm.start()
+        except SlurmUnavailable as error:
+            # With CI set, a Slurm that is missing is an error.
+            if os.environ.get("CI"):
+                raise
+            self.skipTest(f"Slurm: {error}")
+
+    def test_snakemake_and_the_array_give_the_bytes_of_recover(self):
+        simulate(self.captures / "large", 1, "128x128")
+        for seed in (2, 3, 4):
+            simulate(self.captures / f"c{seed}", seed)
+        photograph = self.captures / "c3/photos/0005.png"
+        photograph.write_bytes(photograph.read_bytes()[:1000])
+        self.workflow(*SLURM, "--group-components", "captures=2")
+        self.assert_recovered("large", "c2", "c4")
+        self.assertEqual(self.report()["c3"]["exit_status"], "65")
+
+        array = self.folder / "array.ltm"
+        command = [str(REPO / "workflow/array.sbatch"), str(self.captures / "large"), str(array), "3", "--mem=1500"]
+        environment = os.environ | {"LTM_EXPORT": PROGRAM, "OPTIONS": OPTIONS}
+        jobs = subprocess.run(command, check=True, env=environment, capture_output=True, text=True)
+        last = jobs.stdout.split()[-1]
+        wait_until(lambda: job_state(last) not in ("PENDING", "RUNNING", "COMPLETING"), SECONDS)
+        self.assertEqual(job_state(last), "COMPLETED")
+        self.assertEqual(array.read_bytes(), (self.results / "large.ltm").read_bytes())
+
+
+def job_state(job):
+    """State of a job of Slurm."""
+    answer = subprocess.run(["scontrol", "show", "job", job], capture_output=True, text=True)
+    return re.search(r"JobState=(\w+)", answer.stdout)[1]
+
+
+def commands_on(folder):
+    """Process ids of commands with this folder in their arguments."""
+    processes = Path("/proc").glob("[0-9]*/cmdline")
+    return [path.parent.name for path in processes if str(folder).encode() in read_bytes(path)]
+
+
+def read_bytes(path):
+    """The bytes of a file that may vanish."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

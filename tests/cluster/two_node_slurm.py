@@ -1,0 +1,125 @@
+"""A Slurm of two nodes on this machine, for tests: real daemons from Debian's packages, without containers."""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+PACKAGES = ["slurmctld", "slurmd", "slurm-client", "munge"]
+CONF = Path("/etc/slurm/slurm.conf")
+MARK = "# Written by tests/cluster/two_node_slurm.py\n"
+# Nodes have one core each. Without cgroups, which a container may lack, memory limits are not enforced.
+SETTINGS = """\
+ClusterName=test
+SlurmctldHost={host}(127.0.0.1)
+SlurmctldPort=17000
+SlurmUser=root
+SlurmdUser=root
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool.%n
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.%n.pid
+SlurmctldLogFile={folder}/slurmctld.log
+SlurmdLogFile={folder}/slurmd.%n.log
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+SchedulerParameters=sched_interval=2,batch_sched_delay=0
+SlurmdParameters=config_overrides
+SlurmdTimeout=10
+ReturnToService=2
+MinJobAge=300
+AuthInfo=cred_expire=10
+NodeName=n1 NodeHostname={host} NodeAddr=127.0.0.1 Port=17001 CPUs=1 RealMemory=4000
+NodeName=n2 NodeHostname={host} NodeAddr=127.0.0.1 Port=17002 CPUs=1 RealMemory=4000
+PartitionName=main Nodes=n1,n2 Default=YES MaxTime=INFINITE State=UP
+"""
+
+
+class SlurmUnavailable(Exception):
+    """Slurm cannot be started here; the message says why."""
+
+
+class TwoNodeSlurm:
+    """Starts the daemons in a folder, which stays for the logs."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.daemons = []
+
+    def start(self):
+        """Installs the packages, and starts the daemons. Leaves another Slurm alone."""
+        if os.getuid() != 0 or not shutil.which("apt-get"):
+            raise SlurmUnavailable("needs root and Debian's packages")
+        if CONF.exists() and not CONF.read_text(encoding="utf-8").startswith(MARK):
+            raise SlurmUnavailable(f"{CONF} is another cluster's")
+        if not all(map(shutil.which, ["slurmctld", "slurmd", "sbatch", "munged"])):
+            install = ["apt-get", "install", "-y", "-qq", "--no-install-recommends", *PACKAGES]
+            run(["apt-get", "update", "-qq"])
+            run(install, env=os.environ | {"DEBIAN_FRONTEND": "noninteractive"})
+        (self.folder / "state").mkdir(parents=True)
+        settings = SETTINGS.format(host=socket.gethostname(), folder=self.folder)
+        CONF.write_text(MARK + settings, encoding="utf-8")
+        self._start_munge()
+        self._start("slurmctld", "-D")
+        for node in ("n1", "n2"):
+            self._start("slurmd", "-D", "-N", node)
+        wait_until(lambda: nodes_that_are("idle") == 2, 60)
+
+    def _start_munge(self):
+        """The authentication that Slurm's daemons share; one that runs already serves as well."""
+        if subprocess.run(["munge", "-n"], capture_output=True).returncode == 0:
+            return
+        for folder in ("/run/munge", "/var/log/munge", "/var/lib/munge"):
+            os.makedirs(folder, exist_ok=True)
+            run(["chown", "munge:", folder])
+        self._start("runuser", "-u", "munge", "--", "munged", "--foreground")
+        wait_until(lambda: subprocess.run(["munge", "-n"], capture_output=True).returncode == 0, 20)
+
+    def _start(self, *command):
+        """Starts a daemon in the foreground, in a process group of its own."""
+        log = open(self.folder / f"{Path(command[0]).name}-{len(self.daemons)}.out", "wb")
+        with log:
+            daemon = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
+        self.daemons.append(daemon)
+
+    def stop(self):
+        """Cancels all jobs, and stops what was started."""
+        subprocess.run(["scancel", "--user=root"], capture_output=True)
+        for daemon in reversed(self.daemons):
+            if daemon.poll() is None:
+                os.killpg(daemon.pid, signal.SIGTERM)
+        for daemon in self.daemons:
+            try:
+                daemon.wait(20)
+            except subprocess.TimeoutExpired:
+                os.killpg(daemon.pid, signal.SIGKILL)
+        CONF.unlink(missing_ok=True)
+
+
+def nodes_that_are(state):
+    """Number of nodes in a state."""
+    answer = subprocess.run(["sinfo", "-h", "-N", "-o", "%T"], capture_output=True, text=True)
+    return answer.stdout.split().count(state)
+
+
+def run(command, **options):
+    """Runs a command that has to succeed."""
+    ended = subprocess.run(command, capture_output=True, text=True, **options)
+    if ended.returncode:
+        raise SlurmUnavailable(f"{' '.join(command)}: {ended.stderr.strip()}")
+
+
+def wait_until(is_true, seconds):
+    """Waits until a condition holds."""
+    end = time.monotonic() + seconds
+    while not is_true():
+        if time.monotonic() > end:
+            raise SlurmUnavailable(f"Slurm was not ready after {seconds} s")
+        time.sleep(0.5)
