@@ -44,7 +44,7 @@ impl AddAssign for DefectivePixels {
 }
 
 impl Measurements {
-    /// Fills the hot pixels and then the dead ones of the loaded ones of `rows`; codes are `quantum` apart.
+    /// Fills hot pixels, then dead ones, in the loaded part of `rows`; codes are `quantum` apart.
     /// Pixels without a loaded neighbour stay as they are. Returns the numbers of filled pixels.
     pub fn fill_defective_pixels(&mut self, rows: Range<u32>, quantum: f64) -> DefectivePixels {
         DefectivePixels {

@@ -133,7 +133,7 @@ fn has_passing_code(_: &io::Error) -> bool {
 fn is_temporary(cause: Cause<'_>) -> bool {
     io_error(cause).is_some_and(may_pass)
         || cause.is::<CheckpointInUseError>()
-        || cause.downcast_ref().is_some_and(StageFileError::is_missing)
+        || cause.downcast_ref().is_some_and(StageFileError::may_pass)
         || matches!(cause.downcast_ref(), Some(FormatError::Memory(_)))
 }
 
@@ -170,9 +170,12 @@ fn is_of_file(error: &FormatError) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use anyhow::{Context, anyhow};
 
     use super::*;
+    use crate::cli::stage::stage_folder::StageFileProblem;
 
     fn full() -> io::Error {
         io::ErrorKind::StorageFull.into()
@@ -182,6 +185,7 @@ mod tests {
     fn statuses_tell_whether_to_try_again() {
         let damaged = || io::Error::other(FormatError::TrailingBytes(9));
         let missing = || io::Error::from(io::ErrorKind::NotFound);
+        let stage = |problem: StageFileProblem| problem.of(Path::new("plan.json")).into();
         let cases = [
             (anyhow!("anything else"), FAILURE),
             (UsageError("no such option").into(), USAGE),
@@ -196,6 +200,9 @@ mod tests {
             (FormatError::Spool(missing()).into(), FAILURE),
             (FormatError::Memory(9).into(), TEMPORARY),
             (CheckpointInUseError.into(), TEMPORARY),
+            (stage(StageFileProblem::Missing(String::new())), TEMPORARY),
+            (stage(StageFileProblem::Replaced), TEMPORARY),
+            (stage(StageFileProblem::Damaged(String::new())), DATA_ERROR),
             (full().into(), TEMPORARY),
             (ImageError::IoError(full()).into(), TEMPORARY),
             (EncodingError::IoError(full()).into(), TEMPORARY),

@@ -81,8 +81,8 @@ impl<'a> MeasurementReader<'a> {
         })
     }
 
-    /// Makes `pixels` the loaded pixels of `measurements`: keeps those of rows that it has, which must be the same, and reads
-    /// the others, which must lie below all rows read before. Calls `check` before each photograph, and stops if it fails.
+    /// Makes `pixels` the loaded pixels of `measurements`: keeps rows that are already loaded, whose spans
+    /// must not differ, and reads the others, which must lie below all rows read before. Calls `check` before each photograph, and stops if it fails.
     pub fn load(
         &mut self,
         measurements: &mut Measurements,
@@ -105,7 +105,7 @@ impl<'a> MeasurementReader<'a> {
         Ok(())
     }
 
-    /// Fills the hot and dead pixels of the loaded ones of `rows`. The photographs have these statistics of their
+    /// Fills hot and dead pixels in the loaded part of `rows`. The photographs have these statistics of their
     /// `codes`.
     pub fn fill_defects(
         &self,

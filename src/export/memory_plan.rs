@@ -19,6 +19,9 @@ const TILE_SIDE: u32 = Geometry::DEFAULT_TILE_SIDE;
 const PIXEL_BYTES: u64 = (CHANNELS * size_of::<f32>()) as u64;
 /// The program itself, its buffers, and what the allocator retains.
 const PROGRAM_BYTES: u64 = 32 << 20;
+/// Pixels of a block of resampled photographs, and what a block takes that is not resampled.
+const RESAMPLED_BLOCK_PIXELS: u64 = 64;
+const RESAMPLED_BLOCK_BYTES: u64 = 32;
 /// Reading one photograph, beside its rows: a buffer and the decompressor's window.
 const READER_BYTES: u64 = 320 << 10;
 /// Compressing one recovered tile for the checkpoint, beside the tile.
@@ -107,7 +110,11 @@ impl MemoryPlan {
         let row_bytes = pixel_bytes * width;
         // Photographs may be resampled while the recovery is prepared.
         let resampled = Method::resampled_bytes(shots) as u64;
-        let prepared = |bytes: u64| bytes + bytes.min(resampled);
+        let prepared = |bytes: u64| {
+            bytes
+                + bytes.min(resampled)
+                + camera.area() as u64 / RESAMPLED_BLOCK_PIXELS * RESAMPLED_BLOCK_BYTES
+        };
         let gray_code_rows = gray_code_rows(camera);
         let gray_code_pixel = gray_code as u64 * PIXEL_BYTES + POSITION_BYTES;
         let gray_code_bytes = match gray_code {

@@ -13,26 +13,15 @@ use crate::capture::{CameraPixelSet, DEFECT_MARGIN, noise_sample_squares};
 use crate::transport::{Extent, TileRect, Window};
 
 /// The pixels of a `camera` grid that preparing a recovery by `method` reads, those that fill their defective pixels
-/// included; `window` is `None` if it is estimated. Small pictures are read whole, and so are those of which the squares and
-/// their borders are more than half.
+/// included; `window` is `None` if it is estimated. Small pictures are read whole.
 pub fn preparation_pixels(
     camera: Extent,
     method: Method,
     window: Option<Window>,
 ) -> CameraPixelSet {
-    let all = CameraPixelSet::all(camera);
     if camera.area() <= MAX_SMALL_PICTURE {
-        return all;
+        return CameraPixelSet::all(camera);
     }
-    let used = sampled_pixels(camera, method, window);
-    match 2 * used.count() > camera.area() {
-        true => all,
-        false => used,
-    }
-}
-
-/// The same pixels, if the picture is large.
-fn sampled_pixels(camera: Extent, method: Method, window: Option<Window>) -> CameraPixelSet {
     // Shifted photographs are resampled in blocks, from what is around each block.
     let resampled = |rect: TileRect, margin: u32| {
         let blocks = blocks_of(camera, with_margin(camera, rect, margin));
@@ -242,7 +231,7 @@ mod tests {
         // Estimating the window reads more.
         let estimated = (Method::Bpdn(SparsityBasis::Identity), None);
         for (method, window) in [(Method::Learned, Window::new(WINDOW).ok()), estimated] {
-            let pixels = sampled_pixels(CAMERA, method, window);
+            let pixels = preparation_pixels(CAMERA, method, window);
             assert!(pixels.count() < CAMERA.area() * 3 / 4);
             let sample = loaded(&all, &pixels);
             assert!(
@@ -257,7 +246,7 @@ mod tests {
         let small = Extent::new(724, 724);
         let pixels = |camera| preparation_pixels(camera, Method::Learned, None);
         assert_eq!(pixels(small), CameraPixelSet::all(small));
-        assert_eq!(pixels(CAMERA), CameraPixelSet::all(CAMERA));
+        assert!(pixels(CAMERA).count() < CAMERA.area());
         let nnls = preparation_pixels(CAMERA, Method::Nnls, None);
         assert!(2 * nnls.count() < CAMERA.area());
         // Their number does not grow with the picture.

@@ -2,7 +2,7 @@
 //!
 //! Every photograph is decoded once ([`scanned_capture`]). Files ([`file_findings`]), single photographs
 //! ([`photograph_findings`]) and the Gray code ([`gray_code`]) are looked at first. What photographs say together is found
-//! by the preparation of a recovery, as `recover` runs it, from the pixels that are in memory ([`examination`]).
+//! by the preparation of a recovery, as `recover` runs it, from the same pixels as `recover` ([`examination`]).
 
 mod examination;
 mod file_findings;

@@ -57,6 +57,14 @@ impl LearnedFile {
         Ok(())
     }
 
+    /// Tries whether the file can be written, before the work.
+    ///
+    /// # Errors
+    /// If it cannot be.
+    pub fn try_output(stages: &StageFolder) -> Result<()> {
+        OutputFile::create(&stages.learned(), &LEARNED).map(drop)
+    }
+
     /// # Errors
     /// [`StageFileError`](super::StageFileError) if the file is missing, damaged or of another plan.
     pub fn read(
@@ -65,33 +73,44 @@ impl LearnedFile {
         inputs: &RecoveryInputs<'_>,
     ) -> Result<Self> {
         let (path, remedy) = (stages.learned(), stages.command("learn", ""));
-        let bytes = stages.read(&path, &remedy)?;
-        let damaged = || StageFileProblem::Damaged(remedy.clone()).of(&path);
-        let records = bytes.strip_prefix(&MAGIC).ok_or_else(damaged)?;
-        let mut records = RecordReader::new(records, 0, records.len() as u64);
-        let mut next = |number| -> Result<Record> {
-            let record = records
-                .next()?
-                .filter(|r| r.is_intact && r.number == number);
-            Ok(record.ok_or_else(damaged)?)
-        };
-        let key: LearnedKey = serde_json::from_slice(&next(KEY)?.content).map_err(|_| damaged())?;
+        let (key, content) = read_records(stages)?;
         if key != LearnedKey::of(plan) {
             let made_from = "plan";
-            return Err(StageFileProblem::Foreign { made_from, remedy }
-                .of(&path)
-                .into());
+            let foreign = StageFileProblem::Foreign { made_from, remedy };
+            return Err(foreign.of(&path).into());
         }
-        let content = next(JOB)?.content;
+        let job = zstd::decode_all(&content[..]).ok();
+        let job = job.and_then(|bytes| PreparedJob::from_bytes(&bytes).ok());
+        let job = job.filter(|job| job.is_of(inputs));
         Ok(Self {
             id: sha256(&content),
-            job: zstd::decode_all(&content[..])
-                .ok()
-                .and_then(|bytes| PreparedJob::from_bytes(&bytes).ok())
-                .filter(|job| job.is_of(inputs))
-                .ok_or_else(damaged)?,
+            job: job.ok_or_else(|| StageFileProblem::Damaged(remedy).of(&path))?,
         })
     }
+
+    /// The id alone, of the file that is there now.
+    ///
+    /// # Errors
+    /// [`StageFileError`](super::StageFileError) if it is missing or damaged.
+    pub fn read_id(stages: &StageFolder) -> Result<String> {
+        read_records(stages).map(|(_, content)| sha256(&content))
+    }
+}
+
+/// The key and the compressed job.
+fn read_records(stages: &StageFolder) -> Result<(LearnedKey, Vec<u8>)> {
+    let (path, remedy) = (stages.learned(), stages.command("learn", ""));
+    let bytes = stages.read(&path, &remedy)?;
+    let damaged = || StageFileProblem::Damaged(remedy.clone()).of(&path);
+    let records = bytes.strip_prefix(&MAGIC).ok_or_else(damaged)?;
+    let mut records = RecordReader::new(records, 0, records.len() as u64);
+    let mut next = |number| -> Result<Record> {
+        let record = records.next()?;
+        let record = record.filter(|record| record.is_intact && record.number == number);
+        Ok(record.ok_or_else(damaged)?)
+    };
+    let key = serde_json::from_slice(&next(KEY)?.content).map_err(|_| damaged())?;
+    Ok((key, next(JOB)?.content))
 }
 
 impl LearnedKey {

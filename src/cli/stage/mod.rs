@@ -15,7 +15,7 @@ mod partial_shards;
 mod plan;
 mod shard;
 mod shard_pack;
-mod stage_folder;
+pub(super) mod stage_folder;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -145,7 +145,7 @@ pub fn run(args: &StageArgs) -> Result<()> {
     })
 }
 
-/// Whether a file of a stage is as it is to be. It is not if that is said by a [`StageFileError`]: any other error may pass.
+/// Whether the file of a stage is complete. A [`StageFileError`] means that it is not; other errors are returned.
 fn is_complete<T>(read: Result<T>) -> Result<bool> {
     match read {
         Ok(_) => Ok(true),
@@ -205,6 +205,8 @@ fn learn(args: &LearnArgs, cores: &InterruptibleCores) -> Result<()> {
     if is_complete(LearnedFile::read(&stages, &plan, &inputs))? {
         return print_line(&format!("{}: is complete", stages.learned().display()));
     }
+    // A folder that cannot be written fails before the work.
+    LearnedFile::try_output(&stages)?;
     let memory = inputs.memory_plan(args.memory)?;
     let source = SampleSource {
         plan: &memory,
@@ -253,15 +255,16 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
         .install(recover)
         .and_then(|counts| {
             // A plan that has changed meanwhile has packs of its own.
-            let plan = RecoveryPlan::read(&stages)?;
-            let current = LearnedFile::read(&stages, &plan, &inputs)?;
-            stages.check_learned(&id, &current.id)?;
+            stages.check_learned(&id, &LearnedFile::read_id(&stages)?)?;
             shard_pack::write(&path, &key, counts, |tile| sink.read(tile))
         });
     if let Err(error) = finished {
         // Another process may have finished the shard, and removed the partial packs.
         return match shard_pack::verify(&path, &key) {
-            Ok(()) => print_complete(),
+            Ok(()) => {
+                sink.remove()?;
+                print_complete()
+            }
             Err(_) => Err(sink.explain(error)),
         };
     }

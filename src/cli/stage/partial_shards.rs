@@ -5,7 +5,7 @@
 //! systems may not have.
 
 use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -65,9 +65,10 @@ impl PartialShard {
         let mut others = Vec::new();
         let mut places = vec![None; key.tiles.len()];
         for path in partial_packs(&shards, &stem)? {
-            // Another process may have finished the shard, and removed it.
-            let Ok(file) = File::open(&path) else {
-                continue;
+            let file = match File::open(&path) {
+                // Another process may have finished the shard, and removed it.
+                Err(e) if e.kind() == ErrorKind::NotFound => continue,
+                file => file.with_context(|| path.display().to_string())?,
             };
             let content = PackContent::read(&file, key);
             let Ok(content) = content.with_context(|| path.display().to_string())? else {

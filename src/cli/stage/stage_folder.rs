@@ -27,7 +27,9 @@ pub enum StageFileProblem {
         made_from: &'static str,
         remedy: String,
     },
-    #[error("was replaced while a shard was recovered from it; recover the shard again")]
+    #[error(
+        "was replaced while a shard was recovered from it; the same command recovers the shard again"
+    )]
     Replaced,
     #[error("was written by {0}, and this is {PROGRAM}; use one version for all stages")]
     OtherProgram(String),
@@ -36,9 +38,11 @@ pub enum StageFileProblem {
 }
 
 impl StageFileError {
-    /// Whether another stage may still write the file.
-    pub fn is_missing(&self) -> bool {
-        matches!(self.problem, StageFileProblem::Missing(_))
+    /// Whether the same command may succeed later: once another stage has written the file, or with the file that is there
+    /// now.
+    pub fn may_pass(&self) -> bool {
+        use StageFileProblem::{Missing, Replaced};
+        matches!(self.problem, Missing(_) | Replaced)
     }
 }
 
