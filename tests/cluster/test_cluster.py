@@ -14,7 +14,9 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
+import two_node_slurm
 from two_node_slurm import SlurmUnavailable, TwoNodeSlurm, wait_until
 
 REPO = Path(__file__).resolve().parents[2]
@@ -160,7 +162,7 @@ class KilledDriverTest(WorkflowTest):
     def test_after_kill_9_only_unfinished_captures_run(self):
         for seed in range(1, 7):
             simulate(self.captures / f"c{seed}", seed)
-        run = subprocess.Popen(self.command(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        run = subprocess.Popen(self.command("--cores", "2"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         wait_until(lambda: len(list(self.results.glob("*.result.json"))) >= 2, SECONDS)
         # pkg-scripts/cluster has become Snakemake.
         run.send_signal(signal.SIGKILL)
@@ -168,12 +170,12 @@ class KilledDriverTest(WorkflowTest):
         wait_until(lambda: not commands_on(self.captures), 30)
         finished = {path.name.split(".")[0] for path in self.results.glob("*.result.json")}
         self.assertLess(len(finished), 6)
-        ran = {job.split(":")[0] for job in self.workflow()}
+        ran = {job.split(":")[0] for job in self.workflow("--cores", "2")}
         # Snakemake does not know of a job that ended as it was killed, so that it runs again.
         self.assertLessEqual(len(ran & finished), 2)
         self.assertEqual(ran | finished, {f"c{seed}" for seed in range(1, 7)})
         self.assertLess(len(ran), 6)
-        self.assert_recovered("c1", "c6")
+        self.assert_recovered(*(f"c{seed}" for seed in range(1, 7)))
 
 
 class ShardsTest(WorkflowTest):
@@ -279,6 +281,45 @@ class PageTest(unittest.TestCase):
         html = page([row])
         self.assertIn("&lt;b&gt;", html)
         self.assertNotRegex(html, r"<script(?![^>]*src=)|<style| style=| on\w+=|<b>")
+
+
+class OtherSlurmTest(unittest.TestCase):
+    """A machine that belongs to a real cluster."""
+
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.configuration = self.folder / "slurm.conf"
+        self.enter(mock.patch.object(two_node_slurm, "CONF", self.configuration))
+        self.enter(mock.patch.object(two_node_slurm.os, "getuid", return_value=0))
+        self.enter(mock.patch.object(two_node_slurm.shutil, "which", return_value="/usr/bin/apt-get"))
+        self.commands = self.enter(mock.patch.object(two_node_slurm.subprocess, "run"))
+
+    def enter(self, patch):
+        """Patches until the test ends."""
+        self.addCleanup(patch.stop)
+        return patch.start()
+
+    def test_another_clusters_jobs_and_configuration_stay(self):
+        self.configuration.write_text("ClusterName=production\n", encoding="utf-8")
+        slurm = TwoNodeSlurm(self.folder)
+        with self.assertRaisesRegex(SlurmUnavailable, "is another cluster's"):
+            slurm.start()
+        slurm.stop()
+        self.commands.assert_not_called()
+        self.assertEqual(self.configuration.read_text(encoding="utf-8"), "ClusterName=production\n")
+
+    def test_a_configuration_that_was_replaced_stays(self):
+        slurm = TwoNodeSlurm(self.folder)
+        slurm.settings = two_node_slurm.MARK + "ClusterName=test\n"
+        self.configuration.write_text("ClusterName=production\n", encoding="utf-8")
+        slurm.stop()
+        self.commands.assert_not_called()
+        self.assertTrue(self.configuration.exists())
+        self.configuration.write_text(slurm.settings, encoding="utf-8")
+        slurm.stop()
+        self.commands.assert_called_once_with(["scancel", "--user=root"], capture_output=True)
+        self.assertFalse(self.configuration.exists())
 
 
 class SlurmTest(WorkflowTest):

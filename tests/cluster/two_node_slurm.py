@@ -52,6 +52,7 @@ class TwoNodeSlurm:
     def __init__(self, folder):
         self.folder = folder
         self.daemons = []
+        self.settings = None
 
     def start(self):
         """Installs the packages, and starts the daemons. Leaves another Slurm alone."""
@@ -59,13 +60,15 @@ class TwoNodeSlurm:
             raise SlurmUnavailable("needs root and Debian's packages")
         if CONF.exists() and not CONF.read_text(encoding="utf-8").startswith(MARK):
             raise SlurmUnavailable(f"{CONF} is another cluster's")
+        if CONF.exists() and subprocess.run(["scontrol", "ping"], capture_output=True).returncode == 0:
+            raise SlurmUnavailable("another test's Slurm runs")
         if not all(map(shutil.which, ["slurmctld", "slurmd", "sbatch", "munged"])):
             install = ["apt-get", "install", "-y", "-qq", "--no-install-recommends", *PACKAGES]
             run(["apt-get", "update", "-qq"])
             run(install, env=os.environ | {"DEBIAN_FRONTEND": "noninteractive"})
         (self.folder / "state").mkdir(parents=True)
-        settings = SETTINGS.format(host=socket.gethostname(), folder=self.folder)
-        CONF.write_text(MARK + settings, encoding="utf-8")
+        self.settings = MARK + SETTINGS.format(host=socket.gethostname(), folder=self.folder)
+        CONF.write_text(self.settings, encoding="utf-8")
         self._start_munge()
         self._start("slurmctld", "-D")
         for node in ("n1", "n2"):
@@ -90,8 +93,9 @@ class TwoNodeSlurm:
         self.daemons.append(daemon)
 
     def stop(self):
-        """Cancels all jobs, and stops what was started."""
-        subprocess.run(["scancel", "--user=root"], capture_output=True)
+        """Cancels all jobs, stops the daemons and removes the configuration, if it is still the one of this object."""
+        if self._is_configured():
+            subprocess.run(["scancel", "--user=root"], capture_output=True)
         for daemon in reversed(self.daemons):
             if daemon.poll() is None:
                 os.killpg(daemon.pid, signal.SIGTERM)
@@ -100,7 +104,12 @@ class TwoNodeSlurm:
                 daemon.wait(20)
             except subprocess.TimeoutExpired:
                 os.killpg(daemon.pid, signal.SIGKILL)
-        CONF.unlink(missing_ok=True)
+        if self._is_configured():
+            CONF.unlink()
+
+    def _is_configured(self):
+        """Whether the machine's configuration is the one that this object wrote, with its own folder."""
+        return self.settings is not None and CONF.exists() and CONF.read_text(encoding="utf-8") == self.settings
 
 
 def nodes_that_are(state):
