@@ -29,7 +29,7 @@ SLURM += ["--slurm-init-seconds-before-status-checks", "3", "--latency-wait", "2
 SECONDS = 300
 
 sys.path.insert(0, str(REPO / "workflow/scripts"))
-from captures import CollectionError, read_collection  # noqa: E402
+from captures import Capture, CollectionError, read_collection  # noqa: E402
 from write_page import page  # noqa: E402
 
 
@@ -265,11 +265,39 @@ class CollectionFileTest(unittest.TestCase):
             "name,capture\na\n": "line 2: has not as many fields",
             "name,capture\na,\n": "line 2: capture: is empty",
             "name,capture,options\na,b,'\n": "line 2: options: No closing quotation",
+            "name,capture\na,b\nc,'d\n\"e,f\n": "line 4: unexpected end of data; correct the quotes",
+            'name,capture\n"a,b",c\n': "line 2: name: 'a,b'",
+            b"name,capture\na,b\n\xfcber,c\n": "line 3: is not in UTF-8; save",
         }
         for text, message in cases.items():
-            path.write_text(text, encoding="utf-8")
+            path.write_bytes(text if isinstance(text, bytes) else text.encode())
             with self.assertRaisesRegex(CollectionError, re.escape(message)):
                 read_collection(path)
+
+    def test_names_are_composed_as_on_linux_and_macos(self):
+        decomposed = self.folder / "Fu\u0308ssen"
+        decomposed.mkdir()
+        (decomposed / "capture.json").touch()
+        (capture,) = read_collection(self.folder)
+        self.assertEqual((capture.name, capture.folder), ("F\u00fcssen", decomposed.resolve()))
+        (self.folder / "F\u00fcssen").mkdir()
+        (self.folder / "F\u00fcssen/capture.json").touch()
+        with self.assertRaisesRegex(CollectionError, "the same name in other code points"):
+            read_collection(self.folder)
+
+    def test_the_fingerprint_changes_with_names_sizes_and_dates(self):
+        (self.folder / "capture.json").write_text('{"shots": ["a.png"]}', encoding="utf-8")
+        photograph = self.folder / "a.png"
+        prints = []
+        for content, date in (("a", 2000), ("a", 1000), ("ab", 1000), (None, 0)):
+            if content:
+                photograph.write_text(content, encoding="utf-8")
+                os.utime(photograph, (date, date))
+            else:
+                photograph.unlink()
+            prints.append(Capture("a", self.folder).fingerprint)
+        self.assertEqual(len(set(prints)), 4)
+        self.assertEqual(Capture("a", self.folder).fingerprint, prints[-1])
 
 
 class PageTest(unittest.TestCase):

@@ -2,16 +2,20 @@
 
 import csv
 import hashlib
+import io
 import json
+import os
 import re
 import shlex
+import unicodedata
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 MANIFEST = "capture.json"
-# Names become file names, and parts of Snakemake's patterns and of shell commands.
-NAME = re.compile(r"\w[\w .,+=@-]*")
+# Names become file names, and parts of Snakemake's patterns and of shell commands. Snakemake separates the wildcards of
+# jobs on Slurm by commas.
+NAME = re.compile(r"\w[\w .+=@-]*")
 CSV_COLUMNS = {"name", "capture", "options"}
 
 
@@ -52,9 +56,10 @@ class Capture:
 
     @cached_property
     def fingerprint(self):
-        """Changes with the names and sizes of the files: a file copied with its old date changes no newest date."""
-        sizes = [(path, Path(path).stat().st_size) for path in self.files]
-        return hashlib.sha256(json.dumps(sizes).encode()).hexdigest()[:16]
+        """Changes with the names, sizes and dates of the files. Snakemake itself notices only dates that are newer."""
+        states = [(path, os.stat(path)) for path in self.files]
+        described = [(path, state.st_size, state.st_mtime_ns) for path, state in states]
+        return hashlib.sha256(json.dumps(described).encode()).hexdigest()[:16]
 
 
 def read_collection(path):
@@ -79,33 +84,59 @@ def _read_folder(folder):
         raise CollectionError(
             f"{folder}: holds no capture; give a capture folder, a folder of capture folders, or a CSV file"
         )
-    for capture in folders:
-        if not NAME.fullmatch(capture.name):
-            raise CollectionError(
-                f"{capture}: the folder's name has characters that a result's name cannot have; "
-                "rename it, or name it in a CSV file with the columns name and capture"
-            )
-    return [Capture(capture.name, capture) for capture in folders]
+    captures = {}
+    for folder in folders:
+        capture = _capture_of_folder(folder)
+        if capture.name in captures:
+            raise CollectionError(f"{folder}: another folder has the same name in other code points; rename one")
+        captures[capture.name] = capture
+    return list(captures.values())
+
+
+def _capture_of_folder(folder):
+    """The capture of a folder, with the folder's name."""
+    name = normal_name(folder.name)
+    if not NAME.fullmatch(name):
+        raise CollectionError(
+            f"{folder}: the folder's name has characters that a result's name cannot have; "
+            "rename it, or name it in a CSV file with the columns name and capture"
+        )
+    return Capture(name, folder)
 
 
 def _read_csv(path):
     """Capture folders are relative to the folder of the CSV file."""
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        rows = csv.DictReader(file)
-        columns = set(rows.fieldnames or [])
-        if not {"name", "capture"} <= columns <= CSV_COLUMNS:
-            raise CollectionError(
-                f"{path}: the first line must name the columns name and capture, and optionally options"
-            )
-        captures = {}
+    rows = csv.DictReader(io.StringIO(_text(path), newline=""), strict=True)
+    captures = {}
+    try:
+        _check_columns(path, rows.fieldnames)
         for row in rows:
             capture = _capture_of_row(path, rows.line_num, row)
             if capture.name in captures:
                 raise CollectionError(f"{path}: line {rows.line_num}: name: {capture.name} is there twice; rename one")
             captures[capture.name] = capture
+    except csv.Error as error:
+        place = f"{path}: line {rows.reader.line_num}"
+        raise CollectionError(f"{place}: {error}; correct the quotes and commas") from error
     if not captures:
         raise CollectionError(f"{path}: names no capture; add a line for each")
     return list(captures.values())
+
+
+def _text(path):
+    """The text of a file in UTF-8."""
+    content = path.read_bytes()
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise CollectionError(f"{path}: line {line}: is not in UTF-8; save the file in this encoding") from error
+
+
+def _check_columns(path, columns):
+    """Checks the first line of a CSV file."""
+    if not {"name", "capture"} <= set(columns or []) <= CSV_COLUMNS:
+        raise CollectionError(f"{path}: the first line must name the columns name and capture, and optionally options")
 
 
 def _capture_of_row(path, line, row):
@@ -113,18 +144,28 @@ def _capture_of_row(path, line, row):
     place = f"{path}: line {line}"
     if None in row or None in row.values():
         raise CollectionError(f"{place}: has not as many fields as the first line; correct the line")
-    name, folder, options = row["name"], row["capture"], row.get("options", "")
+    name, folder, options = normal_name(row["name"]), row["capture"], row.get("options", "")
     if not NAME.fullmatch(name):
         raise CollectionError(
-            f"{place}: name: {name!r} cannot be a file's name; use letters, digits, spaces and . , + = @ _ -"
+            f"{place}: name: {name!r} cannot be a file's name; use letters, digits, spaces and . + = @ _ -"
         )
     if not folder:
         raise CollectionError(f"{place}: capture: is empty; give a capture folder")
-    try:
-        shlex.split(options)
-    except ValueError as error:
-        raise CollectionError(f"{place}: options: {error}; correct the quotes") from error
+    split_options(f"{place}: options", options)
     return Capture(name, (path.parent / folder).resolve(), options)
+
+
+def normal_name(name):
+    """A name in composed characters (NFC): macOS gives the names of folders decomposed."""
+    return unicodedata.normalize("NFC", name)
+
+
+def split_options(place, options):
+    """Splits options as a shell does. An error names the place."""
+    try:
+        return shlex.split(options)
+    except ValueError as error:
+        raise CollectionError(f"{place}: {error}; correct the quotes") from error
 
 
 def _strings(value):
