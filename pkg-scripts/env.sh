@@ -33,6 +33,18 @@ first_command() {
   done
 }
 
+# Prints a Python for Snakemake: 3.11 or later, with what makes virtual environments.
+python_for_snakemake() {
+  local name
+  for name in python3.13 python3.12 python3.11 python3; do
+    # Stands for a version manager's command as well, which may have no such Python behind.
+    if "$name" -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+      command -v "$name"
+      return
+    fi
+  done
+}
+
 # Prints the Python of a virtual environment with exactly these packages; makes the environment if it is missing.
 python_with() { # name, packages…
   local name=$1 python environment

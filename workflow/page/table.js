@@ -16,7 +16,7 @@ function compare(a, b) {
 
 function sortBy(column) {
   const head = heads[column];
-  const order = head.ariaSort === "ascending" ? "descending" : "ascending";
+  const order = head.getAttribute("aria-sort") === "ascending" ? "descending" : "ascending";
   const sign = order === "ascending" ? 1 : -1;
   for (const other of heads) other.removeAttribute("aria-sort");
   head.setAttribute("aria-sort", order);

@@ -1,12 +1,14 @@
 """Runs one command of `ltm-export` for a job, and writes how it ended as JSON.
 
 A permanent failure (exit status 1, 2 or 65) is a result as well: the job succeeds, so that Snakemake neither repeats it
-nor stops for it. Any other failure (75, an interruption, a signal) fails the job, so that Snakemake repeats it.
+nor stops for it. Any other failure (75, a panic, an interruption, a signal) fails the job, so that Snakemake repeats
+it; then the JSON is beside the log.
 """
 
 import argparse
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -17,55 +19,52 @@ from pathlib import Path
 FAILURE = 1
 PERMANENT = (FAILURE, 2, 65)
 TEMPORARY = 75
-# Network file systems show a new file to other machines only after some seconds.
-SECONDS_UNTIL_VISIBLE = 60
 # Snakemake repeats a failed job at once.
 SECONDS_UNTIL_RETRY = 5
+# The last message of a log, which may have several lines.
+ERROR = re.compile(r"(?s:.*)^error: ((?s:.*))", re.MULTILINE)
 
 
 def main():
     """Runs the command, unless an earlier one of the same capture failed."""
     args = parse_arguments()
+    temporary = args.log.with_suffix(".temporary.json")
+    temporary.unlink(missing_ok=True)
     earlier = [read_json(path) for path in args.after]
     failed = next((result for result in earlier if result["status"] == "failed"), None)
-    if failed:
-        write_json(args.result, failed)
-        return 0
-    started = time.monotonic()
-    missing = wait_for_files(args.needs)
-    if missing:
-        error = f"{missing}: is missing; delete its folder and run the workflow again"
-        status, report = TEMPORARY, ""
-    else:
-        resumes = args.checkpoint and args.checkpoint.exists()
-        status, report = run(args.command, args.log)
-        if status == FAILURE and resumes:
-            # The checkpoint is of other options or photographs, or of another build of the program.
-            args.checkpoint.unlink(missing_ok=True)
-            status, report = run(args.command, args.log)
-        error = last_error(args.log) if status else None
-    result = {
-        "name": args.name,
-        "status": "failed" if status else "done",
-        "exit_status": status,
-        "error": error,
-        "seconds": round(time.monotonic() - started, 2),
-    }
-    if status not in (0, *PERMANENT):
-        write_json(args.temporary, result)
-        if status == TEMPORARY:
+    result, output = (failed, "") if failed else run_command(args)
+    if result["status"] == "unfinished":
+        write_json(temporary, result)
+        if result["exit_status"] == TEMPORARY:
             time.sleep(SECONDS_UNTIL_RETRY)
-        return status if 0 < status < 126 else TEMPORARY
-    if args.file and status == 0:
-        result |= finished_file(args.command[0], args.file, json.loads(report))
+        return result["exit_status"] if 0 < result["exit_status"] < 126 else TEMPORARY
     if args.file:
-        result["seconds"] = round(sum(part["seconds"] for part in [*earlier, result]), 2)
+        if not failed:
+            result["seconds"] = round(sum(part["seconds"] for part in [*earlier, result]), 2)
+        result |= finish_capture(args, result, output)
     write_json(args.result, result)
-    if args.file:
-        args.temporary.unlink(missing_ok=True)
-    if args.remove and status == 0:
+    if args.remove and result["status"] == "done":
         shutil.rmtree(args.remove, ignore_errors=True)
     return 0
+
+
+def run_command(args):
+    """Runs the command, again without its checkpoint if need be. Returns how it ended, and its standard output."""
+    started = time.monotonic()
+    resumes = args.checkpoint and args.checkpoint.exists()
+    status, output = run(args.command, args.log)
+    if status == FAILURE and resumes:
+        # The checkpoint is of other options or photographs, or of another build of the program.
+        args.checkpoint.unlink(missing_ok=True)
+        status, output = run(args.command, args.log)
+    result = {
+        "name": args.name,
+        "status": "done" if status == 0 else "failed" if status in PERMANENT else "unfinished",
+        "exit_status": status,
+        "error": reason(status, args.log) if status else None,
+        "seconds": round(time.monotonic() - started, 2),
+    }
+    return result, output
 
 
 def parse_arguments():
@@ -73,27 +72,13 @@ def parse_arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--name", required=True, help="name of the capture")
     parser.add_argument("--result", type=Path, required=True, help="JSON file to write")
-    parser.add_argument("--temporary", type=Path, required=True, help="JSON file to write after a temporary failure")
     parser.add_argument("--log", type=Path, required=True, help="file for what the command prints on standard error")
     parser.add_argument("--after", type=Path, nargs="*", default=[], help="results of commands that come before")
-    parser.add_argument("--needs", type=Path, nargs="*", default=[], help="files that those commands wrote")
     parser.add_argument("--file", type=Path, help="the .ltm file that this command writes")
     parser.add_argument("--checkpoint", type=Path, help="file from which the command resumes, if it can")
     parser.add_argument("--remove", type=Path, help="folder to remove after success")
     parser.add_argument("command", nargs="+")
     return parser.parse_args()
-
-
-def wait_for_files(paths):
-    """Waits until all files are visible. Returns the first that does not become so."""
-    end = time.monotonic() + SECONDS_UNTIL_VISIBLE
-    for path in paths:
-        while not path.exists():
-            if time.monotonic() > end:
-                return path
-            os.listdir(path.parent if path.parent.exists() else ".")
-            time.sleep(1)
-    return None
 
 
 def run(command, log):
@@ -116,11 +101,33 @@ def run(command, log):
                     process.terminate()
 
 
-def last_error(log):
-    """The error message at the end of a log."""
-    text = log.read_text(encoding="utf-8", errors="replace")
-    _, found, error = text.rpartition("error: ")
-    return error.strip()[:2000] if found else "the command ended without an error message"
+def reason(status, log):
+    """Why a command failed: its last error message, or how it ended without one."""
+    if status < 0:
+        return f"ended by signal {-status}" + ("; is memory_mb too low?" if -status == signal.SIGKILL else "")
+    message = ERROR.match(log.read_text(encoding="utf-8", errors="replace"))
+    if message:
+        return message[1].strip()[:2000]
+    return f"ended with exit status {status} and without an error message; see {log}"
+
+
+def finish_capture(args, result, output):
+    """Puts the files of a capture in order. Returns what its result says about them."""
+    for temporary in args.log.parent.glob("*.temporary.json"):
+        temporary.unlink(missing_ok=True)
+    if result["status"] == "done":
+        return finished_file(args.command[0], args.file, json.loads(output))
+    set_aside(args.file)
+    return {}
+
+
+def set_aside(file):
+    """Moves an earlier file and its picture to the folder `previous`: they are not of the capture as it is now."""
+    for path in (file, file.with_suffix(".png")):
+        if path.exists():
+            previous = path.parent / "previous"
+            previous.mkdir(exist_ok=True)
+            path.replace(previous / path.name)
 
 
 def finished_file(program, path, report):

@@ -13,25 +13,19 @@ from captures import read_collection
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
 CSV_COLUMNS = ["name", "status", "exit_status", "error", "snr_db", "bytes", "seconds", "warnings", "capture"]
+STATUSES = ["recovered", "failed", "unfinished"]
 HEADS = ["Photograph", "Status", "SNR (dB)", "Size (kB)", "Time (s)", "Warnings", "Message"]
 
 
 def write_page(captures, folder):
-    """Writes the results of captures in a folder."""
+    """Writes the results of captures in a folder. Returns them."""
     folder = Path(folder)
     results = [read_result(capture, folder) for capture in captures]
     write_text(folder / "report.csv", report(results))
     write_text(folder / "index.html", page(results))
     for name in ("page.css", "table.js"):
         shutil.copyfile(PAGE / name, folder / name)
-
-
-def forget_lost_files(names):
-    """Removes the results of files in the working folder that have been deleted since, so that they are made again."""
-    for name in names:
-        result = read_json(Path(f"{name}.result.json")) or {}
-        if "file" in result and not Path(result["file"]).exists():
-            os.remove(f"{name}.result.json")
+    return results
 
 
 def read_result(capture, folder):
@@ -40,7 +34,7 @@ def read_result(capture, folder):
     if result:
         status = "recovered" if result["status"] == "done" else "failed"
     else:
-        result = read_json(folder / "logs" / f"{capture.name}.temporary.json") or {
+        result = last_temporary_failure(folder / "logs" / capture.name) or {
             "error": "the job was ended from outside or has not run; run the workflow again",
         }
         status = "unfinished"
@@ -58,6 +52,20 @@ def read_result(capture, folder):
         "file": result.get("file"),
         "picture": result.get("picture"),
     }
+
+
+def last_temporary_failure(logs):
+    """The newest temporary failure in a folder of logs; None if there is none."""
+    failures = filter(None, map(read_json, sorted(logs.glob("*.temporary.json"), key=modified)))
+    return next(reversed(list(failures)), None)
+
+
+def modified(path):
+    """When a file was written; 0 if it has vanished."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
 
 
 def read_json(path):
@@ -84,30 +92,47 @@ class _Lines(list):
     write = list.append
 
 
+def summary(results):
+    """How many captures ended in which way."""
+    counts = [sum(result["status"] == status for result in results) for status in STATUSES]
+    return ", ".join(f"{count} {status}" for count, status in zip(counts, STATUSES, strict=True))
+
+
 def page(results):
-    """The table as HTML."""
-    counts = {status: sum(result["status"] == status for result in results) for status in ("recovered", "failed")}
-    unfinished = len(results) - sum(counts.values())
-    summary = f"{counts['recovered']} recovered, {counts['failed']} failed, {unfinished} unfinished."
-    heads = "".join(f'<th scope="col"><button type="button">{head}</button></th>' for head in HEADS)
+    """The table as HTML. Its script is a classic one, as browsers load no modules from file:// addresses."""
     rows = "\n".join(map(row, results))
     return f"""<!DOCTYPE html>
 <html lang="en">
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
 <title>Relightable photographs</title>
 <link rel="stylesheet" href="page.css">
-<script type="module" src="table.js"></script>
+<script src="table.js" defer></script>
+<main>
 <h1>Relightable photographs</h1>
-<p>{summary} <a href="report.csv">report.csv</a></p>
+<p>{summary(results)}. <a href="report.csv">report.csv</a></p>
 <p id="sorting" role="status"></p>
+<div class="scroll" role="region" aria-labelledby="caption" tabindex="0">
 <table>
-<thead><tr>{heads}</tr></thead>
+<caption id="caption">Results of all captures. The buttons in the first row sort the table.</caption>
+<thead><tr>{heads()}</tr></thead>
 <tbody>
 {rows}
 </tbody>
 </table>
+</div>
+</main>
 """
+
+
+def heads():
+    """The first row. The table begins in order of names."""
+    sortings = [' aria-sort="ascending"', *[""] * (len(HEADS) - 1)]
+    return "".join(
+        f'<th scope="col"{sorting}><button type="button">{head}</button></th>'
+        for head, sorting in zip(HEADS, sortings, strict=True)
+    )
 
 
 def row(result):
