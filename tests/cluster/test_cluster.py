@@ -205,6 +205,118 @@ class ShardsTest(WorkflowTest):
         self.assert_recovered("at fault")
 
 
+# Stands for ltm-export without any work. The file "fails" has lines of a stage or capture and its exit status.
+PRETENDER = """#!/bin/sh
+key=$1
+[ "$1" = stage ] && key=$2
+[ "$1" = recover ] && key=${2##*/}
+status=$(sed -n "s/^$key //p" fails 2>/dev/null)
+if [ -n "$status" ]; then
+  echo "error: $key fails" >&2
+  exit $status
+fi
+for argument; do
+  [ "$before" = -o ] && output=$argument
+  before=$argument
+done
+case $key in
+  plan) mkdir -p "$output/shards" && echo plan >"$output/plan.json" ;;
+  learn) echo learned >"$3/learned.bin" ;;
+  tiles) echo tiles >"$3/shards/${5%/*}-of-${5#*/}.pack" ;;
+  *) echo "$key" >"$output" && echo '{"levels": 2, "warnings": []}' ;;
+esac
+"""
+
+
+class EngineTest(WorkflowTest):
+    """What runs, and what does not, with a program that does nothing."""
+
+    def setUp(self):
+        self.program = self.folder / "pretender"
+        self.program.write_text(PRETENDER, encoding="utf-8")
+        self.program.chmod(0o755)
+        for name, side in (("a", 10), ("b", 10), ("large", 200)):
+            (self.captures / name).mkdir()
+            camera = {"width": side, "height": side}
+            (self.captures / name / "capture.json").write_text(json.dumps({"camera": camera}), encoding="utf-8")
+        self.results.mkdir()
+
+    def run_with(self, *options, fails="", changed=(), status=0):
+        """Runs with failures, after changes of captures. Returns the jobs."""
+        (self.results / "fails").write_text(fails, encoding="utf-8")
+        for name in changed:
+            manifest = self.captures / name / "capture.json"
+            os.utime(manifest, (1e9, manifest.stat().st_mtime - 1000))
+        return self.workflow(*options, status=status, program=self.program)
+
+    def states(self):
+        """The statuses of a, b and large."""
+        return [row["status"] for _, row in sorted(self.report().items())]
+
+    def test_the_engine(self):
+        stages = ["assemble", "learn", "plan", *(f"recover tiles {i} of 3" for i in range(1, 4))]
+        large = [f"large: {stage}" for stage in stages]
+        everything = ["a: recover", "b: recover", *large]
+        self.assertEqual(self.run_with(), everything)
+        self.assertEqual(self.run_with(), [])
+
+        with self.subTest("a dry run deletes nothing; the next run makes the lost file"):
+            (self.results / "a.ltm").unlink()
+            self.run_with("-n")
+            self.assertTrue((self.results / "a.result.json").exists())
+            self.assertEqual(self.run_with(), ["a: recover"])
+
+        with self.subTest("a file with an older date is noticed; the file of a capture that fails is set aside"):
+            self.assertEqual(self.run_with(fails="a 2\n", changed=["a"]), ["a: recover"])
+            self.assertEqual(self.states(), ["failed", "recovered", "recovered"])
+            self.assertFalse((self.results / "a.ltm").exists() or (self.results / "a.png").exists())
+            self.assertTrue((self.results / "previous/a.ltm").exists() and (self.results / "previous/a.png").exists())
+
+        with self.subTest("options that no capture allows fail the run"):
+            self.run_with(fails="a 2\nb 2\nplan 2\n", changed=["a", "b", "large"], status=1)
+            self.assertEqual(self.states(), ["failed"] * 3)
+
+        with self.subTest("without its result a failed capture runs again, its failed stages as well"):
+            (self.results / "large.result.json").unlink()
+            self.run_with(fails="learn 65\n")
+            self.assertEqual(self.report()["large"]["exit_status"], "65")
+            (self.results / "large.result.json").unlink()
+            self.assertEqual(self.run_with(), [job for job in large if job != "large: plan"])
+
+        with self.subTest("a temporary failure shows the last error, of any stage"):
+            self.run_with(fails="tiles 75\nb 101\n", changed=["a", "b", "large"], status=1)
+            self.assertEqual(self.states(), ["recovered", "unfinished", "unfinished"])
+            self.assertEqual([self.report()[name]["exit_status"] for name in ("b", "large")], ["101", "75"])
+            self.run_with()
+            self.assertEqual(self.states(), ["recovered"] * 3)
+            self.assertEqual(list(self.results.glob("logs/*/*.temporary.json")), [])
+
+
+class ArrayTest(unittest.TestCase):
+    """array.sbatch, with a command in place of sbatch."""
+
+    def test_the_jobs_run_in_any_posix_shell(self):
+        folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
+        self.addCleanup(shutil.rmtree, folder)
+        name = "it's \u00fc\tb"
+        (folder / name).mkdir()
+        # Runs the job at once. The program writes its threads and arguments to a file.
+        sbatch = '#!/bin/sh\nfor a; do case $a in --wrap=*) sh -c "${a#--wrap=}" ;; esac; done\necho 1\n'
+        program = f'#!/bin/sh\nprintf "%s|" "$RAYON_NUM_THREADS" "$@" >>"{folder}/calls"\n'
+        for file, content in (("sbatch", sbatch), ("it's", program)):
+            (folder / file).write_text(content, encoding="utf-8")
+            (folder / file).chmod(0o755)
+        environment = {"PATH": f"{folder}:{os.environ['PATH']}", "LTM_EXPORT": str(folder / "it's")}
+        environment |= {"SLURM_CPUS_PER_TASK": "3", "SLURM_ARRAY_TASK_ID": "2", "OPTIONS": "--window 7"}
+        command = [REPO / "workflow/array.sbatch", folder / name, folder / f"{name}.ltm", "4"]
+        subprocess.run(command, env=environment, check=True, capture_output=True, timeout=60)
+        stages = f"{folder.resolve()}/{name}-stages"
+        calls = f"3|stage|plan|{folder.resolve()}/{name}|--window|7|-o|{stages}|3|stage|learn|{stages}|"
+        calls += f"3|stage|tiles|{stages}|--shard|2/4|"
+        calls += f"3|stage|assemble|{stages}|--shards|4|-o|{folder.resolve()}/{name}.ltm|"
+        self.assertEqual((folder / "calls").read_text(encoding="utf-8"), calls)
+
+
 class DriverTest(unittest.TestCase):
     """run_command.py: what is repeated, and what is not."""
 
@@ -212,7 +324,7 @@ class DriverTest(unittest.TestCase):
         """Runs a shell script as a job. Returns the job's exit status and the folder with its files."""
         folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
         self.addCleanup(shutil.rmtree, folder)
-        files = ["--result", folder / "result.json", "--temporary", folder / "temporary.json", "--log", folder / "log"]
+        files = ["--result", folder / "result.json", "--log", folder / "x.log"]
         command = [sys.executable, REPO / "workflow/scripts/run_command.py", "--name", "x", *files, *options]
         command += ["--", "sh", "-c", script]
         return subprocess.run(list(map(str, command)), timeout=60).returncode, folder
@@ -224,6 +336,14 @@ class DriverTest(unittest.TestCase):
             self.assertEqual((ended, result["status"], result["exit_status"]), (0, "failed", status))
             self.assertEqual(result["error"], "x.png: is cut off")
 
+    def test_the_error_is_the_last_message_with_its_lines(self):
+        for script, error in (
+            ("echo 'warning: no error: here' >&2; exit 1", "ended with exit status 1 and without an error message"),
+            ("printf 'error: first\\nerror: a: error: b\\n  c\\n' >&2; exit 1", "a: error: b\n  c"),
+        ):
+            _, folder = self.run_script(script)
+            self.assertTrue(json.loads((folder / "result.json").read_text())["error"].startswith(error))
+
     def test_a_checkpoint_of_other_options_is_given_up(self):
         checkpoint = Path(tempfile.mkdtemp(prefix="cluster-test-")) / "x.ltm.checkpoint"
         self.addCleanup(shutil.rmtree, checkpoint.parent)
@@ -233,12 +353,20 @@ class DriverTest(unittest.TestCase):
         self.assertEqual((ended, result["status"]), (0, "done"))
 
     def test_temporary_failures_fail_the_job(self):
-        for script, status in (("exit 75", 75), ("exit 130", 130), ("kill -9 $$", -9)):
+        cases = {
+            "exit 75": (75, "ended with exit status 75"),
+            "exit 101": (101, "ended with exit status 101"),
+            "exit 130": (130, "ended with exit status 130"),
+            "kill -9 $$": (-9, "ended by signal 9; is memory_mb too low?"),
+            "kill $$": (-15, "ended by signal 15"),
+        }
+        for script, (status, error) in cases.items():
             ended, folder = self.run_script(script)
             self.assertNotEqual(ended, 0)
             self.assertFalse((folder / "result.json").exists())
-            result = json.loads((folder / "temporary.json").read_text())
+            result = json.loads((folder / "x.temporary.json").read_text())
             self.assertEqual(result["exit_status"], status)
+            self.assertTrue(result["error"].startswith(error), result["error"])
 
 
 class CollectionFileTest(unittest.TestCase):
@@ -309,6 +437,9 @@ class PageTest(unittest.TestCase):
         html = page([row])
         self.assertIn("&lt;b&gt;", html)
         self.assertNotRegex(html, r"<script(?![^>]*src=)|<style| style=| on\w+=|<b>")
+        self.assertNotIn("module", html, "browsers load no modules from file: addresses")
+        self.assertRegex(html, r"<main>(?s:.)*<caption(?s:.)*</main>")
+        self.assertEqual(html.count('aria-sort="ascending"'), 1)
 
 
 class OtherSlurmTest(unittest.TestCase):

@@ -31,12 +31,12 @@ def write_page(captures, folder):
 def read_result(capture, folder):
     """How a capture's recovery ended, as a row of the table."""
     result = read_json(folder / f"{capture.name}.result.json")
-    if result:
+    # The result of a capture in shards stays while a stage of its next recovery fails.
+    failure = last_temporary_failure(folder / "logs" / capture.name)
+    if result and not failure:
         status = "recovered" if result["status"] == "done" else "failed"
     else:
-        result = last_temporary_failure(folder / "logs" / capture.name) or {
-            "error": "the job was ended from outside or has not run; run the workflow again",
-        }
+        result = failure or {"error": "the job was ended from outside or has not run; run the workflow again"}
         status = "unfinished"
     recovery = result.get("report", {})
     return {
