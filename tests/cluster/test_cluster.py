@@ -292,6 +292,28 @@ class EngineTest(WorkflowTest):
             self.assertEqual(list(self.results.glob("logs/*/*.temporary.json")), [])
 
 
+class LauncherTest(WorkflowTest):
+    """pkg-scripts/cluster before Snakemake has captures."""
+
+    def start(self, flock, *options):
+        """Starts it with a flock that ends with a status. Returns what it says on standard error."""
+        command = self.folder / "flock"
+        command.write_text(f"#!/bin/sh\nexit {flock}\n", encoding="utf-8")
+        command.chmod(0o755)
+        environment = os.environ | {"LTM_EXPORT": "true", "PATH": f"{self.folder}:{os.environ['PATH']}"}
+        ended = subprocess.run(self.command(*options), env=environment, capture_output=True, text=True, timeout=SECONDS)
+        self.assertEqual(ended.returncode, 1)
+        return ended.stderr
+
+    def test_only_a_lock_that_is_held_stops_a_run(self):
+        held = self.start(1)
+        self.assertIn("another run writes there", held)
+        self.assertNotIn("holds no capture", held)
+        without = self.start(71, "--resources", "gpu=1", "mem_mb=500")
+        self.assertIn("its file system has no locks (flock ended with status 71)", without)
+        self.assertIn("holds no capture", without)
+
+
 class ArrayTest(unittest.TestCase):
     """array.sbatch, with a command in place of sbatch."""
 
