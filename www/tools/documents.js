@@ -34,6 +34,7 @@ export const DOCUMENT_GROUPS = [
       ['docs/shooting.md', 'From a display to a capture'],
       ['docs/capture.md', 'The capture folder'],
       ['docs/cli.md', 'ltm-export'],
+      ['docs/cluster.md', 'Collections and clusters'],
       ['docs/results.md', 'Accuracy'],
     ],
   },
