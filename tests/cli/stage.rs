@@ -386,7 +386,9 @@ fn files_of_other_stages_are_checked_and_named() {
     let mut changed = bytes.clone();
     *changed.last_mut().unwrap() ^= 1;
     fs::write(&photo, changed).unwrap();
-    fails(&learn, 65, &["0003.png has changed since", "stage plan"]);
+    for stage in [&learn[..], &assemble] {
+        fails(stage, 65, &["0003.png has changed since", "stage plan"]);
+    }
     fs::write(&photo, &bytes).unwrap();
     fails(&["stage", "tiles", stages, "--shard", "3/2"], 2, &["3/16"]);
 

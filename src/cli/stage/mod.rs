@@ -284,7 +284,7 @@ fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
         stages,
         plan,
         capture,
-    } = args.folders.open(Comparison::Manifest)?;
+    } = args.folders.open(Comparison::Contents)?;
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
     let LearnedFile { id, mut job } = LearnedFile::read(&stages, &plan, &inputs)?;
     job.findings.print_further();

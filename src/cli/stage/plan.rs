@@ -22,8 +22,6 @@ const PLAN: FileSignature = FileSignature::of_own_name("a plan");
 /// How a capture is compared with the one that was planned.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Comparison {
-    /// Its manifest only.
-    Manifest,
     /// Its manifest, and the lengths of its other files.
     Lengths,
     /// All files whole.
@@ -128,10 +126,9 @@ impl RecoveryPlan {
         for (name, planned) in &self.files {
             let path = capture.root().join(name);
             let is_compared_whole = name == MANIFEST_NAME || comparison == Comparison::Contents;
-            let is_same = match comparison {
-                _ if is_compared_whole => FileDigest::of(&path).map(|digest| digest == *planned),
-                Comparison::Manifest => Ok(true),
-                _ => path.metadata().map(|file| file.len() == planned.bytes),
+            let is_same = match is_compared_whole {
+                true => FileDigest::of(&path).map(|digest| digest == *planned),
+                false => path.metadata().map(|file| file.len() == planned.bytes),
             };
             let is_same = is_same.map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)))?;
             if !is_same {
