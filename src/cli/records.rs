@@ -4,7 +4,8 @@
 //! little-endian), and the content. Records are only appended, so that a process that ends leaves at most one incomplete
 //! record, the last.
 
-use std::io::{self, Read};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 
 use anyhow::{Context, Result};
@@ -90,6 +91,17 @@ impl<R: Read> RecordReader<R> {
             None => Ok(None),
         }
     }
+}
+
+/// Reads the content of a record at its [range](Record::range).
+///
+/// # Errors
+/// If the file cannot be read, or ends before.
+pub fn read_content(mut file: &File, range: &Range<u64>) -> io::Result<Vec<u8>> {
+    let mut content = vec![0; (range.end - range.start) as usize];
+    file.seek(SeekFrom::Start(range.start))?;
+    file.read_exact(&mut content)?;
+    Ok(content)
 }
 
 /// The bytes of a record.

@@ -22,7 +22,7 @@ use anyhow::{Context, Error, Result, bail, ensure};
 use super::checkpoint_key::CheckpointKey;
 use super::tile_recovery::{TileSink, decompress_tile};
 use crate::cli::process_resources::Interrupted;
-use crate::cli::records::{RECORD_HEAD_BYTES, RecordReader, encode_record};
+use crate::cli::records::{RECORD_HEAD_BYTES, RecordReader, encode_record, read_content};
 
 const MAGIC: [u8; 8] = *b"LTMPART2";
 /// What the magics of all versions begin with.
@@ -144,12 +144,9 @@ impl Checkpoint {
     }
 
     /// Reads tile `i`'s record, decompressed.
-    pub fn read(&mut self, i: usize) -> io::Result<Vec<u8>> {
+    pub fn read(&self, i: usize) -> io::Result<Vec<u8>> {
         let range = self.tiles[i].clone().ok_or(ErrorKind::NotFound)?;
-        let mut content = vec![0; (range.end - range.start) as usize];
-        self.file.seek(SeekFrom::Start(range.start))?;
-        self.file.read_exact(&mut content)?;
-        decompress_tile(&content)
+        decompress_tile(&read_content(&self.file, &range)?)
     }
 
     /// Appends a record; returns the range of its content.

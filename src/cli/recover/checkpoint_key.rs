@@ -118,9 +118,7 @@ pub fn file_digests(
     let digest = |(name, path): (&str, PathBuf)| -> Result<(String, FileDigest)> {
         let interrupted = || Interrupted("interrupted before anything was read".to_owned());
         ensure!(!cores.is_cancelled(), interrupted());
-        let digest = FileDigest::of(&path);
-        let digest = digest.map_err(|e| CaptureError::new(path, CaptureErrorKind::Io(e)))?;
-        Ok((name.to_owned(), digest))
+        Ok((name.to_owned(), FileDigest::of(&path)?))
     };
     let files = inputs.folder.files(&inputs.shots);
     files.into_par_iter().map(digest).collect()
@@ -134,12 +132,15 @@ pub struct FileDigest {
 }
 
 impl FileDigest {
-    /// Reads the whole file.
-    pub fn of(path: &Path) -> io::Result<Self> {
-        let mut reader = Crc32cReader::new(File::open(path)?);
-        let bytes = io::copy(&mut reader, &mut io::sink())?;
-        let crc = reader.crc32c();
-        Ok(Self { bytes, crc })
+    /// Reads the whole file, which is one of a capture.
+    pub fn of(path: &Path) -> Result<Self, CaptureError> {
+        let read = || -> io::Result<Self> {
+            let mut reader = Crc32cReader::new(File::open(path)?);
+            let bytes = io::copy(&mut reader, &mut io::sink())?;
+            let crc = reader.crc32c();
+            Ok(Self { bytes, crc })
+        };
+        read().map_err(|e| CaptureError::new(path, CaptureErrorKind::Io(e)))
     }
 }
 

@@ -11,11 +11,10 @@ use super::capture_sample::{CaptureSample, SampleSource};
 use super::checkpoint::{Checkpoint, lock};
 use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
 use super::inputs::{RecoveryInputs, encoders};
-use super::ltm_writer::LtmWriter;
-use super::messages;
+use super::ltm_writer::{Destination, finish};
 use super::prepared_job::PreparedJob;
 use super::report::RecoverReport;
-use super::tile_recovery::{TileCounts, TilePhotographs, TileRecovery};
+use super::tile_recovery::{TilePhotographs, TileRecovery};
 use crate::job_executor::Cancelled;
 use crate::recover::PreparedRecovery;
 use crate::transport::Basis;
@@ -78,40 +77,22 @@ impl RecoverJob<'_> {
     /// Recovers into the checkpoint and writes the file. An interruption is reported as [`Cancelled`].
     fn recover(
         &self,
-        mut job: PreparedJob,
+        job: PreparedJob,
         sample: CaptureSample,
         checkpoint: &Mutex<Checkpoint>,
     ) -> Result<RecoverReport> {
-        let (source, options) = (self.source, self.inputs.options);
+        let source = self.source;
         let tile_rows = 0..job.recovery.geometry().tile_grid().height;
         let photographs = TilePhotographs::of_sample(sample);
         let recovery = TileRecovery { job: &job, source };
         let counts = recovery.run(photographs, tile_rows, checkpoint)?;
-        add_findings_of_tiles(&mut job, counts);
-        job.findings.check(options.strict)?;
-        let writer = LtmWriter {
+        let destination = Destination {
             output: &self.args.output,
-            job: &job,
-            quality: options.quality(),
-            levels: self.inputs.levels,
             plan: source.plan,
             cores: source.cores,
             too_large_remedy: TOO_LARGE_REMEDY,
         };
-        let metadata = job.metadata(&self.inputs.shots, options.method())?;
-        let written = writer.write(&metadata, &|i| lock(checkpoint).read(i))?;
-        Ok(RecoverReport::new(
-            self.start,
-            self.inputs,
-            &job,
-            counts,
-            &written,
-        ))
+        let record = |i| lock(checkpoint).read(i);
+        finish(self.start, self.inputs, job, counts, &destination, &record)
     }
-}
-
-/// What is found while tiles are recovered.
-pub fn add_findings_of_tiles(job: &mut PreparedJob, counts: TileCounts) {
-    job.findings.add(messages::defective_pixels(counts.defects));
-    job.findings.add(messages::overexposure(counts.overexposed));
 }

@@ -3,11 +3,15 @@
 use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::{Error, Result};
 
-use super::inputs::encoders;
+use super::inputs::{RecoveryInputs, encoders};
+use super::messages;
 use super::prepared_job::PreparedJob;
+use super::report::RecoverReport;
+use super::tile_recovery::TileCounts;
 use crate::cli::levels_output::{temporary_spool, write_levels};
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, thread_pool};
@@ -26,17 +30,48 @@ const RETRY_SHARE: f64 = 0.98;
 /// Reads the record of a tile.
 pub type ReadTile<'a> = dyn Fn(usize) -> io::Result<Vec<u8>> + Sync + 'a;
 
-/// Writes the file of a recovery.
-pub struct LtmWriter<'a> {
+/// Where a file goes, and what it is written with.
+pub struct Destination<'a> {
     pub output: &'a Path,
-    pub job: &'a PreparedJob,
-    pub quality: FileQuality,
-    /// Number of levels of the file.
-    pub levels: u32,
     pub plan: &'a MemoryPlan,
     pub cores: &'a InterruptibleCores,
-    /// What an error advises after the tiles are recovered.
+    /// What to do after a `--max-bytes` that is too low.
     pub too_large_remedy: &'static str,
+}
+
+/// Writes the file of a recovery.
+struct LtmWriter<'a> {
+    destination: &'a Destination<'a>,
+    job: &'a PreparedJob,
+    quality: FileQuality,
+    /// Number of levels of the file.
+    levels: u32,
+}
+
+/// Writes the file of tiles that `record` reads, as `recover` and its last stage do. `counts` are those of the tiles.
+///
+/// # Errors
+/// If there is a warning and `--strict`, and if the file cannot be written. An interruption is reported as [`Cancelled`].
+pub fn finish(
+    start: Instant,
+    inputs: &RecoveryInputs<'_>,
+    mut job: PreparedJob,
+    counts: TileCounts,
+    destination: &Destination<'_>,
+    record: &ReadTile<'_>,
+) -> Result<RecoverReport> {
+    job.findings.add(messages::defective_pixels(counts.defects));
+    job.findings.add(messages::overexposure(counts.overexposed));
+    job.findings.check(inputs.options.strict)?;
+    let writer = LtmWriter {
+        destination,
+        job: &job,
+        quality: inputs.options.quality(),
+        levels: inputs.levels,
+    };
+    let metadata = job.metadata(&inputs.shots, inputs.options.method())?;
+    let written = writer.write(&metadata, record)?;
+    Ok(RecoverReport::new(start, inputs, &job, counts, &written))
 }
 
 /// A file that was written.
@@ -48,10 +83,10 @@ pub struct WrittenFile {
 
 impl LtmWriter<'_> {
     /// Encodes the tiles that `record` reads, and writes the file. An interruption is reported as [`Cancelled`].
-    pub fn write(&self, metadata: &Metadata, record: &ReadTile<'_>) -> Result<WrittenFile> {
+    fn write(&self, metadata: &Metadata, record: &ReadTile<'_>) -> Result<WrittenFile> {
         let window = self.job.recovery.geometry().window;
         let rank = self.job.rank().unwrap_or(0);
-        let encoders = encoders(self.plan, self.levels, window, rank)?;
+        let encoders = encoders(self.destination.plan, self.levels, window, rank)?;
         thread_pool(encoders)?.install(|| self.write_within_limit(metadata, record))
     }
 
@@ -61,7 +96,7 @@ impl LtmWriter<'_> {
         record: &ReadTile<'_>,
     ) -> Result<WrittenFile> {
         let _spinner = progress::spinner("compressing");
-        let levels = self.levels;
+        let (levels, destination) = (self.levels, self.destination);
         let mut quality = self.quality;
         let max_bytes = match quality {
             FileQuality::MaxBytes(bytes) => bytes,
@@ -73,7 +108,7 @@ impl LtmWriter<'_> {
         loop {
             let file = self.encode(record, metadata.clone(), quality);
             let file = file.map_err(|error| self.writing_error(error, max_bytes))?;
-            let output = OutputFile::create(self.output, &LTM)?;
+            let output = OutputFile::create(destination.output, &LTM)?;
             let written = output.finish(|out| match levels {
                 1 => Ok(file.write(out)?),
                 _ => {
@@ -82,7 +117,14 @@ impl LtmWriter<'_> {
                         ..PyramidLayout::of_levels(levels)
                     };
                     let fetch = |chunk| Ok(file.chunk(chunk)?.into_owned());
-                    write_levels(self.output, file.index(), &fetch, layout, self.cores, out)?;
+                    write_levels(
+                        destination.output,
+                        file.index(),
+                        &fetch,
+                        layout,
+                        destination.cores,
+                        out,
+                    )?;
                     Ok(())
                 }
             });
@@ -114,14 +156,15 @@ impl LtmWriter<'_> {
         metadata: Metadata,
         quality: FileQuality,
     ) -> Result<EncodedFile<SpooledChunks<File>>, FormatError> {
-        let new_store = || temporary_spool(self.output).map(SpooledChunks::new);
+        let Destination { output, cores, .. } = *self.destination;
+        let new_store = || temporary_spool(output).map(SpooledChunks::new);
         let recovery = &self.job.recovery;
-        export::encode_file(recovery, record, metadata, quality, self.cores, new_store)
+        export::encode_file(recovery, record, metadata, quality, cores, new_store)
     }
 
     /// The error with the name of the output; `max_bytes` is what the user asked for.
     fn writing_error(&self, error: FormatError, max_bytes: u64) -> Error {
-        let output = self.output.display();
+        let output = self.destination.output.display();
         match error {
             FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
             FormatError::TooLarge { limit, smallest } => {
@@ -131,7 +174,7 @@ impl LtmWriter<'_> {
                 let limit = max_bytes;
                 Error::new(FormatError::TooLarge { limit, smallest }).context(format!(
                     "{output}: cannot be written; {}",
-                    self.too_large_remedy
+                    self.destination.too_large_remedy
                 ))
             }
             other => Error::new(other).context(output.to_string()),

@@ -9,7 +9,7 @@ mod checkpoint;
 pub(super) mod checkpoint_key;
 pub(super) mod findings;
 pub(super) mod inputs;
-pub(super) mod job;
+mod job;
 pub(super) mod ltm_writer;
 pub(super) mod messages;
 pub(super) mod origin;

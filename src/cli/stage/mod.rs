@@ -36,10 +36,8 @@ use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
 use super::recover::args::{DEFAULT_MEMORY, RecoveryOptions};
 use super::recover::capture_sample::SampleSource;
 use super::recover::inputs::RecoveryInputs;
-use super::recover::job::add_findings_of_tiles;
-use super::recover::ltm_writer::LtmWriter;
+use super::recover::ltm_writer::{Destination, finish};
 use super::recover::prepared_job::PreparedJob;
-use super::recover::report::RecoverReport;
 use super::recover::tile_recovery::{TilePhotographs, TileRecovery};
 use super::report::{print_json, print_line};
 use super::value_parsers::ByteCount;
@@ -166,12 +164,12 @@ impl Folders {
     ///
     /// # Errors
     /// If either cannot be read, and if the capture has changed since.
-    fn open(&self, comparison: Comparison) -> Result<PlannedCapture> {
+    fn open(&self, comparison: Comparison, cores: &InterruptibleCores) -> Result<PlannedCapture> {
         let stages = StageFolder::new(&self.folder);
         let plan = RecoveryPlan::read(&stages)?;
         let capture = self.capture.as_ref().unwrap_or(&plan.capture);
         let capture = CaptureFolder::open(capture)?;
-        plan.check(&stages, &capture, comparison)?;
+        plan.check(&stages, &capture, comparison, cores)?;
         Ok(PlannedCapture {
             stages,
             plan,
@@ -200,7 +198,7 @@ fn learn(args: &LearnArgs, cores: &InterruptibleCores) -> Result<()> {
         stages,
         plan,
         capture,
-    } = args.folders.open(Comparison::Contents)?;
+    } = args.folders.open(Comparison::Contents, cores)?;
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
     if is_complete(LearnedFile::read(&stages, &plan, &inputs))? {
         return print_line(&format!("{}: is complete", stages.learned().display()));
@@ -227,7 +225,7 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
         stages,
         plan,
         capture,
-    } = args.folders.open(Comparison::Lengths)?;
+    } = args.folders.open(Comparison::Lengths, cores)?;
     // Copies of folders may lack empty ones.
     StageFolder::create(&args.folders.folder)?;
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
@@ -284,26 +282,20 @@ fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
         stages,
         plan,
         capture,
-    } = args.folders.open(Comparison::Contents)?;
+    } = args.folders.open(Comparison::Contents, cores)?;
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
     let LearnedFile { id, mut job } = LearnedFile::read(&stages, &plan, &inputs)?;
     job.findings.print_further();
     let memory = inputs.memory_plan(args.memory)?;
     let packs = ShardPacks::open(&stages, &id, job.recovery.geometry(), args.shards)?;
-    add_findings_of_tiles(&mut job, packs.counts());
-    job.findings.check(plan.options.strict)?;
-    let writer = LtmWriter {
+    let destination = Destination {
         output: &args.output,
-        job: &job,
-        quality: plan.options.quality(),
-        levels: inputs.levels,
         plan: &memory,
         cores,
         too_large_remedy: TOO_LARGE_REMEDY,
     };
-    let metadata = job.metadata(&inputs.shots, plan.options.method())?;
-    let written = writer.write(&metadata, &|i| packs.read(i))?;
-    let report = RecoverReport::new(start, &inputs, &job, packs.counts(), &written);
+    let record = |i| packs.read(i);
+    let report = finish(start, &inputs, job, packs.counts(), &destination, &record)?;
     match args.json {
         true => print_json(&report),
         false => report.print(&args.output, capture.manifest()),

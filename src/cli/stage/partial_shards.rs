@@ -12,11 +12,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use anyhow::{Context, Error, Result};
 
 use super::shard::{Shard, ShardKey};
-use super::shard_pack::{KEY, MAGIC, PackContent, TilePlace, read_place};
+use super::shard_pack::{KEY, MAGIC, PackContent, TilePlace};
 use super::stage_folder::StageFolder;
 use crate::cli::output_file::{temporary_beside, without_path};
 use crate::cli::process_resources::Interrupted;
-use crate::cli::records::{RECORD_HEAD_BYTES, encode_record};
+use crate::cli::records::{RECORD_HEAD_BYTES, encode_record, read_content};
 use crate::cli::recover::tile_recovery::TileSink;
 use crate::job_executor::Cancelled;
 
@@ -116,7 +116,7 @@ impl PartialShard {
                 (&own.path, &own.file)
             }
         };
-        read_place(file, place).with_context(|| path.display().to_string())
+        read_content(file, place).with_context(|| path.display().to_string())
     }
 
     /// Removes the partial packs of the shard, once its pack is written.

@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::stage_folder::{StageFileProblem, StageFolder};
@@ -15,6 +16,7 @@ use crate::cli::process_resources::InterruptibleCores;
 use crate::cli::recover::args::RecoveryOptions;
 use crate::cli::recover::checkpoint_key::{FileDigest, PROGRAM, file_digests};
 use crate::cli::recover::inputs::RecoveryInputs;
+use crate::job_executor::Executor;
 use crate::transport::Window;
 
 const PLAN: FileSignature = FileSignature::of_own_name("a plan");
@@ -116,27 +118,32 @@ impl RecoveryPlan {
     /// Compares the capture with the one that was planned.
     ///
     /// # Errors
-    /// [`StageFileError`](super::StageFileError) if a file has changed, and if one cannot be read.
+    /// [`StageFileError`](super::StageFileError) if a file has changed, and if one cannot be read or the executor is cancelled.
     pub fn check(
         &self,
         stages: &StageFolder,
         capture: &CaptureFolder,
         comparison: Comparison,
+        cores: &InterruptibleCores,
     ) -> Result<()> {
-        for (name, planned) in &self.files {
+        self.files.par_iter().try_for_each(|(name, planned)| {
+            cores.check_cancelled()?;
             let path = capture.root().join(name);
             let is_compared_whole = name == MANIFEST_NAME || comparison == Comparison::Contents;
             let is_same = match is_compared_whole {
-                true => FileDigest::of(&path).map(|digest| digest == *planned),
-                false => path.metadata().map(|file| file.len() == planned.bytes),
+                true => FileDigest::of(&path)? == *planned,
+                false => {
+                    let file = path.metadata();
+                    let file = file.map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)));
+                    file?.len() == planned.bytes
+                }
             };
-            let is_same = is_same.map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)))?;
             if !is_same {
                 let name = path.display().to_string();
                 let changed = StageFileProblem::ChangedCapture(name);
                 return Err(changed.of(&stages.plan()).into());
             }
-        }
-        Ok(())
+            Ok(())
+        })
     }
 }

@@ -11,7 +11,7 @@
 //! A [partial](super::partial_shards) pack lacks the last record, and has its tiles in any order.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -21,7 +21,7 @@ use anyhow::{Context, Error, Result};
 use super::shard::{Shard, ShardKey};
 use super::stage_folder::{StageFileProblem, StageFolder};
 use crate::cli::output_file::{FileSignature, InputError, OutputFile};
-use crate::cli::records::{RecordReader, encode_record};
+use crate::cli::records::{RecordReader, encode_record, read_content};
 use crate::cli::recover::tile_recovery::{TileCounts, decompress_tile};
 use crate::transport::Geometry;
 
@@ -142,7 +142,7 @@ impl ShardPack {
     /// The record of a tile in its place.
     fn read(&self, place: &TilePlace) -> io::Result<Vec<u8>> {
         let file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        let content = read_place(&file, place);
+        let content = read_content(&file, place);
         drop(file);
         content
             .and_then(|content| decompress_tile(&content))
@@ -151,14 +151,6 @@ impl ShardPack {
                 io::Error::other(InputError(error))
             })
     }
-}
-
-/// Reads the content at a place.
-pub fn read_place(mut file: &File, place: &TilePlace) -> io::Result<Vec<u8>> {
-    let mut content = vec![0; (place.end - place.start) as usize];
-    file.seek(SeekFrom::Start(place.start))?;
-    file.read_exact(&mut content)?;
-    Ok(content)
 }
 
 /// Whether the pack at `path` is complete and has this key.
