@@ -130,20 +130,42 @@ impl CameraPixelSet {
         }
         self.rows.contains_all(rows)
     }
-}
 
-/// Only programs load parts of rows.
-#[cfg(not(target_arch = "wasm32"))]
-impl CameraPixelSet {
     /// Number of pixels.
     pub fn count(&self) -> usize {
-        match &self.spans {
-            Some(spans) => spans.starts[spans.columns.len()],
-            None => self.rows.count() * self.width as usize,
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Some(spans) = &self.spans {
+            return spans.starts[spans.columns.len()];
         }
+        self.rows.count() * self.width as usize
+    }
+
+    /// A list of the pixels, parted into the spans of the rows.
+    #[cfg(feature = "capture")]
+    pub fn split<'a, T>(&self, mut list: &'a [T]) -> Vec<&'a [T]> {
+        let mut parts = Vec::new();
+        for y in self.rows.iter() {
+            for span in self.spans_of(y) {
+                let (part, rest) = list.split_at(span.len().min(list.len()));
+                parts.push(part);
+                list = rest;
+            }
+        }
+        parts
+    }
+
+    /// Number of pixels above row `y`.
+    pub fn count_above(&self, y: u32) -> usize {
+        let above = self.rows.iter().take_while(|row| *row < y).count();
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Some(spans) = &self.spans {
+            return spans.starts[spans.first[above]];
+        }
+        above * self.width as usize
     }
 
     /// The set as rectangles of one row, row by row.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn rects(&self) -> impl Iterator<Item = TileRect> {
         self.rows.iter().flat_map(|y| {
             self.spans_of(y).map(move |span| TileRect {
@@ -152,15 +174,6 @@ impl CameraPixelSet {
                 extent: Extent::new(span.end - span.start, 1),
             })
         })
-    }
-
-    /// Number of pixels above row `y`.
-    pub fn count_above(&self, y: u32) -> usize {
-        let above = self.rows.iter().take_while(|row| *row < y).count();
-        match &self.spans {
-            Some(spans) => spans.starts[spans.first[above]],
-            None => above * self.width as usize,
-        }
     }
 }
 

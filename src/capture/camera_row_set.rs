@@ -61,6 +61,18 @@ impl CameraRowSet {
         self.index_of(y).is_some()
     }
 
+    /// The first row from `y` on.
+    pub fn first_from(&self, y: u32) -> Option<u32> {
+        let mut strips = self.strips.iter();
+        let strip = strips.find(|strip| strip.end > y)?;
+        Some(strip.start.max(y))
+    }
+
+    /// The row below the last; 0 if there are none.
+    pub fn end(&self) -> u32 {
+        self.strips.last().map_or(0, |strip| strip.end)
+    }
+
     /// Whether the set contains every row of `strip`.
     pub fn contains_all(&self, strip: Range<u32>) -> bool {
         let mut strips = self.strips.iter();
@@ -94,12 +106,16 @@ mod tests {
                 .enumerate()
                 .all(|(i, y)| rows.index_of(y) == Some(i))
         );
+        let first = [0, 2, 4, 5, 10, 11].map(|y| rows.first_from(y));
+        let expected = [Some(2), Some(2), Some(4), Some(8), Some(10), None];
+        assert_eq!((first, rows.end()), (expected, 11));
         assert!(rows.contains_all(2..5) && rows.contains_all(9..10) && rows.contains_all(6..6));
         assert!(!rows.contains_all(4..9) && !rows.contains_all(10..12));
         assert_eq!(
             CameraRowSet::all(3),
             CameraRowSet::from_strips([0..1, 1..3])
         );
-        assert_eq!(CameraRowSet::from_strips([]).count(), 0);
+        let none = CameraRowSet::from_strips([]);
+        assert_eq!((none.count(), none.end()), (0, 0));
     }
 }

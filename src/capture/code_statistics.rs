@@ -71,6 +71,18 @@ impl CodeStatistics {
         }
     }
 
+    /// Counts `samples` of channel `c` with a `code`.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn add_code(&mut self, c: usize, code: u16, samples: usize, is_saturated: bool) {
+        for (are_multiples, factor) in self.are_multiples.iter_mut().zip(EIGHT_BIT_FACTORS) {
+            *are_multiples = *are_multiples && code.is_multiple_of(factor);
+        }
+        match is_saturated {
+            true => self.saturated += samples,
+            false => count(&mut self.highest[c], code, samples),
+        }
+    }
+
     /// The same counts if codes from `saturated_from` on are saturated, as far as these are the two highest.
     #[must_use]
     pub fn with_saturation(mut self, saturated_from: [u32; CHANNELS]) -> Self {

@@ -106,9 +106,9 @@ pub enum CaptureErrorKind {
         /// Whether the missing photograph is that of the inverted pattern.
         inverted: bool,
     },
-    /// The file is not a PNG, or is damaged.
-    #[error("is not a readable PNG: {0}")]
-    Unreadable(String),
+    /// The file does not have the format given first, or is damaged.
+    #[error("is not a readable {0}: {1}")]
+    Unreadable(&'static str, String),
     /// The size of a picture differs from the manifest's.
     #[error("is {found} pixels; {MANIFEST_NAME} says {expected}")]
     WrongExtent {
@@ -118,7 +118,7 @@ pub enum CaptureErrorKind {
         expected: Extent,
     },
     /// A photograph has another sample type.
-    #[error("is {0}; a photograph must be a 16-bit linear RGB PNG")]
+    #[error("is {0}; a photograph must be 16-bit linear RGB")]
     PhotoType(String),
     /// A pattern has another sample type.
     #[error("is {0}; a pattern must be an 8-bit grey or RGB PNG")]
@@ -126,6 +126,12 @@ pub enum CaptureErrorKind {
     /// A photograph is interlaced and cannot be read row by row.
     #[error("is interlaced; photographs are read row by row")]
     Interlaced,
+    /// A TIFF is not one of strips of whole pixels.
+    #[error("{0}; photographs are read row by row, from strips of whole pixels")]
+    NotInStrips(&'static str),
+    /// A TIFF has strips of so many rows that they take too much memory.
+    #[error("has strips of {0} rows, which take too much memory")]
+    LargeStrips(u32),
     /// A file of known transport has the wrong form.
     #[error("{0}")]
     InvalidTruth(String),

@@ -33,11 +33,13 @@ pub(crate) use defective_pixels::MARGIN as DEFECT_MARGIN;
 pub use error::{CaptureError, CaptureErrorKind, MANIFEST_NAME};
 #[cfg(feature = "capture")]
 pub use folder::{
-    CaptureFiles, CaptureFolder, DarkFrame, DiskFiles, PhotographRowReader, read_unlisted_pattern,
-    read_unlisted_photo,
+    CaptureFiles, CaptureFolder, DarkFrame, DarkFrameReader, DiskFiles, PhotographRowReader,
+    read_unlisted_pattern, read_unlisted_photo,
 };
 #[cfg(all(feature = "capture", not(target_arch = "wasm32")))]
-pub use folder::{GroundTruth, PhotographScan, RELIT_FULL_SCALE};
+pub use folder::{
+    GroundTruth, IngestError, IngestSource, IngestedPhotograph, PhotographScan, RELIT_FULL_SCALE,
+};
 pub(crate) use group_ids::{group_count, group_ids};
 pub use manifest::{
     CameraResponse, GrayCodeShot, ListedPhotograph, Manifest, ManifestCamera, ManifestLight,

@@ -8,17 +8,17 @@ use clap::Args;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use serde::Serialize;
-use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
-use serde::ser::Serializer;
-use serde_json::value::RawValue;
 
 use super::check::{CheckReport, check_capture};
+use super::object_text::ObjectText;
 use super::output_file::{OutputFile, PNG, temporary_beside};
 use super::process_resources::{Interrupted, InterruptibleCores};
 use super::progress;
 use super::report::{print_json, print_line};
 use crate::calibrate::{GrayCodeFit, ResidualSummary};
-use crate::capture::{CameraRowSet, CaptureFolder, Manifest, ManifestCamera, NoiseModel};
+use crate::capture::{
+    CameraPixelSet, CameraRowSet, CaptureFolder, Manifest, ManifestCamera, NoiseModel,
+};
 use crate::job_executor::Cancelled;
 use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
 
@@ -144,9 +144,10 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     let map = args.map.as_ref();
     let map = map.map(|path| OutputFile::create(path, &PNG)).transpose()?;
     let spinner = progress::spinner("decoding Gray code");
-    let dark = folder.read_dark()?;
     let camera = manifest.camera.extent();
-    let gray_code = folder.read_gray_code(&dark, &rows(manifest))?;
+    let rows = rows(manifest);
+    let pixels = CameraPixelSet::of_rows(rows.clone(), camera.width);
+    let gray_code = folder.read_gray_code(&folder.read_dark(&pixels)?, &rows)?;
     let fit = gray_code
         .fit(camera)
         .with_context(|| path.display().to_string())?;
@@ -292,51 +293,15 @@ fn draw_map(output: OutputFile, camera: Extent, correspondence: &Correspondence)
     Ok(())
 }
 
-/// The fields of a JSON object in their order, with their texts.
-struct ObjectText(Vec<(String, Box<RawValue>)>);
-
-impl<'de> Deserialize<'de> for ObjectText {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Fields;
-        impl<'de> Visitor<'de> for Fields {
-            type Value = ObjectText;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("an object")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<ObjectText, A::Error> {
-                let mut fields = Vec::new();
-                while let Some(field) = map.next_entry()? {
-                    fields.push(field);
-                }
-                Ok(ObjectText(fields))
-            }
-        }
-        deserializer.deserialize_map(Fields)
-    }
-}
-
-impl Serialize for ObjectText {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(name, text)| (name, text)))
-    }
-}
-
 /// Sets "correspondence" in the manifest at `path`, and keeps the text of all other fields.
 fn write_correspondence(path: &Path, correspondence: &Correspondence) -> Result<()> {
     let write = || -> Result<()> {
-        let json = std::fs::read_to_string(path)?;
-        // Some editors write a byte order mark.
-        let json = json.strip_prefix('\u{feff}').unwrap_or(&json);
-        let mut manifest: ObjectText = serde_json::from_str(json)?;
-        manifest.0.retain(|(name, _)| name != "correspondence");
-        let text = RawValue::from_string(serde_json::to_string(correspondence)?)?;
-        manifest.0.push(("correspondence".to_owned(), text));
-        let json = serde_json::to_string_pretty(&manifest)?;
+        let mut manifest = ObjectText::read(path)?;
+        manifest.remove("correspondence");
+        manifest.push("correspondence", correspondence)?;
         let (builder, parent) = temporary_beside(path, 0o666);
         let file = builder.tempfile_in(parent)?;
-        std::fs::write(file.path(), json + "\n")?;
+        std::fs::write(file.path(), manifest.pretty()?)?;
         file.persist(path)?;
         Ok(())
     };

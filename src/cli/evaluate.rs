@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::finest_level::FinestLevel;
 use super::ltm_file::PrefixLength;
 use super::report::{format_bytes, print_json, print_line};
-use crate::capture::{CameraPixelSet, CaptureFolder, GroundTruth, PhotographRowReader};
+use crate::capture::{CameraPixelSet, CaptureFolder, DarkFrame, GroundTruth, PhotographRowReader};
 use crate::relight::{BuiltinLight, Light};
 use crate::study::{CaptureTruth, psnr};
 use crate::transport::{CHANNELS, Decibels, Geometry, SnrAccumulator, transport_error};
@@ -146,13 +146,14 @@ impl EvaluateReport {
         used: &[usize],
     ) -> Result<()> {
         let plane = file.geometry.light;
-        let dark = folder.read_dark()?;
+        let dark = folder.read_dark(&CameraPixelSet::all(file.geometry.camera))?;
         let mut errors = [SnrAccumulator::default(); CHANNELS];
         let mut fitted_errors = SnrAccumulator::default();
         for i in (0..folder.manifest().shots.len()).filter(|i| !used.contains(i)) {
             let light = Light::from_linear_rgb(plane, &folder.read_pattern(i)?.rgb())?;
             let mut of_photo = [SnrAccumulator::default(); CHANNELS];
-            let moments = add_error(&mut of_photo, file, &light, folder.open_shot(i, &dark)?)?;
+            let photo = folder.open_shot(i)?;
+            let moments = add_error(&mut of_photo, file, &light, photo, &dark)?;
             let (gain, stray_light) = moments.fit_line();
             let fitted = moments.error_of_line(gain, stray_light);
             self.heldout_table.push(HeldOutPhotograph {
@@ -181,10 +182,10 @@ impl EvaluateReport {
                  moved since?"
             );
         }
-        if let Some(photo) = folder.open_flood(&dark)? {
+        if let Some(photo) = folder.open_flood()? {
             let light = BuiltinLight::Flood.render(plane);
             let mut errors = [SnrAccumulator::default(); CHANNELS];
-            add_error(&mut errors, file, &light, photo)?;
+            add_error(&mut errors, file, &light, photo, &dark)?;
             self.flood_snr_db = errors.into_iter().sum::<SnrAccumulator>().snr();
         }
         Ok(())
@@ -271,13 +272,14 @@ fn add_error(
     file: &mut FinestLevel,
     light: &Light,
     mut reader: PhotographRowReader,
+    dark: &DarkFrame,
 ) -> Result<SampleMoments> {
     let mut moments = SampleMoments::default();
     let mut photo = Vec::new();
     let width = file.geometry.camera.width;
     file.relight(light, |rows, picture| {
         photo.clear();
-        reader.read(&CameraPixelSet::row_range(rows, width), &mut photo)?;
+        reader.read(&CameraPixelSet::row_range(rows, width), dark, &mut photo)?;
         for (predicted, measured) in picture.iter().zip(&photo) {
             for c in 0..CHANNELS {
                 if measured[c].is_finite() {

@@ -1,4 +1,4 @@
-//! SHA-256 of the files of a capture.
+//! SHA-256 of the files of a capture. A capture that was ingested stands for the one that it was made from.
 
 use std::fs::File;
 use std::io::Read;
@@ -9,9 +9,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::ingested_manifest::{SOURCE_MANIFEST, is_of_source};
 use super::process_resources::InterruptibleCores;
 use super::progress;
-use crate::capture::{CaptureFolder, MANIFEST_NAME};
+use crate::capture::{CaptureFolder, IngestedPhotograph, MANIFEST_NAME};
 use crate::job_executor::Executor;
 
 const READ_BYTES: usize = 1 << 20;
@@ -26,7 +27,8 @@ pub struct HashedFile {
     pub sha256: String,
 }
 
-/// Hashes the manifest of a capture, and the files that a recovery from `shots` reads, sorted by their paths.
+/// Hashes the manifest of a capture, and the files that a recovery from `shots` reads, sorted by their paths. Of a
+/// capture that was ingested, these are the files that it was made from, as their records say: the hash of all is the same.
 ///
 /// # Errors
 /// If a file cannot be read, or the command is interrupted.
@@ -44,11 +46,25 @@ pub fn hash_capture(
     let bar = progress::bar("hashing", names.len());
     let hashed = names.into_par_iter().map(|name| -> Result<HashedFile> {
         cores.check_cancelled()?;
-        let hashed = hash_file(&folder.root().join(&name), name);
+        let path = match name == MANIFEST_NAME && is_of_source(folder.root()) {
+            true => folder.root().join(SOURCE_MANIFEST),
+            false => folder.root().join(&name),
+        };
+        let ingested = IngestedPhotograph::read(&path).with_context(|| path.display().to_string());
+        let hashed = match ingested? {
+            Some(IngestedPhotograph { source, .. }) => HashedFile {
+                path: source.name,
+                bytes: source.bytes,
+                sha256: source.sha256,
+            },
+            None => hash_file(&path, name)?,
+        };
         bar.inc(1);
-        hashed
+        Ok(hashed)
     });
-    hashed.collect()
+    let mut hashed = hashed.collect::<Result<Vec<_>>>()?;
+    hashed.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(hashed)
 }
 
 /// Lines as `sha256sum` writes them.

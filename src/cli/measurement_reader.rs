@@ -1,4 +1,5 @@
-//! Reads patterns and photographs of several shots in parallel; photographs row by row from the top.
+//! Reads patterns and photographs of several shots in parallel; photographs row by row from the top, without rows that can
+//! be skipped.
 
 use std::ops::Range;
 
@@ -13,35 +14,39 @@ use crate::capture::{
 use crate::job_executor::Executor;
 
 /// Reads the patterns of `shots` and the correspondence, by `gray_code_rows` of the Gray code if the manifest does not
-/// give it. The measurements have no camera pixels yet.
+/// give it. The measurements have no camera pixels yet, and this `noise`.
 pub fn read_patterns(
     folder: &CaptureFolder,
-    dark: &DarkFrame,
+    noise: NoiseModel,
     shots: &[usize],
     gray_code_rows: &CameraRowSet,
 ) -> Result<Measurements> {
     let correspondence = match &folder.manifest().correspondence {
         Some(correspondence) => correspondence.clone(),
         None => {
+            let camera = folder.manifest().camera.extent();
+            let pixels = CameraPixelSet::of_rows(gray_code_rows.clone(), camera.width);
+            let dark = folder.read_dark(&pixels)?;
             folder
-                .read_gray_code(dark, gray_code_rows)?
-                .fit(folder.manifest().camera.extent())
+                .read_gray_code(&dark, gray_code_rows)?
+                .fit(camera)
                 .with_context(|| folder.manifest_path().display().to_string())?
                 .correspondence
         }
     };
     let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
     let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
-    Ok(folder.empty_measurements(shots, patterns, correspondence, dark.noise()))
+    Ok(folder.empty_measurements(shots, patterns, correspondence, noise))
 }
 
-/// Reads `pixels` of a photograph, and the rest of the file, which checks that it is whole.
+/// Reads `pixels` of a photograph, and what [`PhotographRowReader::finish`] says.
 pub fn read_sample_of(
     mut photo: PhotographRowReader<'_>,
+    dark: &DarkFrame,
     pixels: &CameraPixelSet,
 ) -> Result<(LinearPhoto, CodeStatistics)> {
     let mut samples = LinearPhoto::new();
-    photo.read(pixels, &mut samples)?;
+    photo.read(pixels, dark, &mut samples)?;
     let codes = photo.finish()?;
     Ok((samples, codes))
 }
@@ -68,12 +73,8 @@ pub struct MeasurementReader<'a> {
 
 impl<'a> MeasurementReader<'a> {
     /// Opens the photographs of `shots`.
-    pub fn open(
-        folder: &'a CaptureFolder,
-        dark: &'a DarkFrame,
-        shots: &[usize],
-    ) -> Result<Self, CaptureError> {
-        let photos = shots.par_iter().map(|&i| folder.open_shot(i, dark));
+    pub fn open(folder: &'a CaptureFolder, shots: &[usize]) -> Result<Self, CaptureError> {
+        let photos = shots.par_iter().map(|&i| folder.open_shot(i));
         let camera = &folder.manifest().camera;
         Ok(Self {
             photos: photos.collect::<Result<_, _>>()?,
@@ -82,10 +83,12 @@ impl<'a> MeasurementReader<'a> {
     }
 
     /// Makes `pixels` the loaded pixels of `measurements`: keeps rows that are already loaded, whose spans
-    /// must not differ, and reads the others, which must lie below all rows read before. Calls `check` before each photograph, and stops if it fails.
+    /// must not differ, and reads the others, which must lie below all rows read before, and where `dark` was read. Calls
+    /// `check` before each photograph, and stops if it fails.
     pub fn load(
         &mut self,
         measurements: &mut Measurements,
+        dark: &DarkFrame,
         pixels: &CameraPixelSet,
         check: impl Fn() -> Result<()> + Sync,
     ) -> Result<()> {
@@ -99,7 +102,7 @@ impl<'a> MeasurementReader<'a> {
             photo.drain(..obsolete);
             // Strips have similar heights, so the first reservation is enough for all.
             photo.reserve_exact(pixels.count().saturating_sub(photo.len()));
-            Ok::<_, Error>(reader.read(pixels, photo)?)
+            Ok::<_, Error>(reader.read(pixels, dark, photo)?)
         })?;
         measurements.loaded = pixels.clone();
         Ok(())
@@ -116,15 +119,17 @@ impl<'a> MeasurementReader<'a> {
         measurements.fill_defective_pixels(rows, f64::from(codes.step()) * self.code)
     }
 
-    /// Loads `pixels`, estimates the noise from them, and reads the rest of all files, which checks that they are whole.
+    /// Loads `pixels`, estimates the noise from them, and reads the rest of the files that do not say the statistics of their
+    /// codes, which checks that they are whole.
     pub fn read_sample(
         mut self,
         measurements: &mut Measurements,
+        dark: &DarkFrame,
         pixels: &CameraPixelSet,
         executor: &impl Executor,
     ) -> Result<ReadSample> {
         let bar = progress::bar("reading", self.photos.len());
-        self.load(measurements, pixels, || {
+        self.load(measurements, dark, pixels, || {
             bar.inc(1);
             Ok(executor.check_cancelled()?)
         })?;

@@ -7,11 +7,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
+/// How the names of temporary files begin.
+pub const TEMPORARY_PREFIX: &str = ".ltm-export-";
+
 /// A builder of temporary files or folders with the permissions of ordinary ones (`mode` minus the umask, not
 /// tempfile's private default), and the folder of `path` to create them in.
 pub fn temporary_beside(path: &Path, mode: u32) -> (tempfile::Builder<'static, 'static>, &Path) {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".ltm-export-");
+    builder.prefix(TEMPORARY_PREFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

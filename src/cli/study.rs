@@ -256,10 +256,12 @@ fn simulated_capture(scene: &dyn SimulatedScene) -> SimulatedCapture<'_> {
 fn read_measurements(folder: &CaptureFolder) -> Result<Measurements> {
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
     let camera = folder.manifest().camera.extent();
-    let dark = folder.read_dark()?;
-    let mut measurements = read_patterns(folder, &dark, &shots, &CameraRowSet::all(camera.height))?;
-    let reader = MeasurementReader::open(folder, &dark, &shots)?;
-    reader.read_sample(&mut measurements, &CameraPixelSet::all(camera), CORES)?;
+    let pixels = CameraPixelSet::all(camera);
+    let dark = folder.read_dark(&pixels)?;
+    let gray_code_rows = CameraRowSet::all(camera.height);
+    let mut measurements = read_patterns(folder, dark.noise(), &shots, &gray_code_rows)?;
+    let reader = MeasurementReader::open(folder, &shots)?;
+    reader.read_sample(&mut measurements, &dark, &pixels, CORES)?;
     Ok(measurements)
 }
 

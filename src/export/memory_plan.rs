@@ -70,8 +70,42 @@ pub struct MemoryPlan {
     rows_at_once: u32,
     /// Number of tiles recovered at once.
     tiles_at_once: usize,
-    threads: usize,
-    limit: u64,
+}
+
+/// The memory limit of encoding a file, once the photographs are unloaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncodingMemory {
+    /// In bytes.
+    pub limit: u64,
+    /// Most tiles that are encoded at once.
+    pub threads: usize,
+}
+
+impl EncodingMemory {
+    /// Number of tiles of the file encoded at once: of a picture of this size, with functions of `window` and `rank` components.
+    /// The encoded file is not included.
+    ///
+    /// # Errors
+    /// If the limit is too low for one tile.
+    pub fn tiles_at_once(
+        self,
+        camera: Extent,
+        window: Window,
+        rank: usize,
+    ) -> Result<usize, TooLittleMemory> {
+        let (fixed, tile) = encoding_bytes(camera, window, rank);
+        let (limit, min) = (self.limit, fixed + tile);
+        match limit < min {
+            true => Err(TooLittleMemory { limit, min }),
+            false => Ok(self.threads.min(((limit - fixed) / tile) as usize)),
+        }
+    }
+
+    /// The lowest limit, in bytes, with which a tile can be encoded.
+    pub fn min_bytes(camera: Extent, window: Window, rank: usize) -> u64 {
+        let (fixed, tile) = encoding_bytes(camera, window, rank);
+        fixed + tile
+    }
 }
 
 impl MemoryPlan {
@@ -87,6 +121,37 @@ impl MemoryPlan {
         window: Option<Window>,
         threads: usize,
     ) -> Result<Self, TooLittleMemory> {
+        let sample = preparation_pixels(size.camera, method, window);
+        Self::with_sample(limit, size, method, window, threads, sample)
+    }
+
+    /// A plan for the tiles alone of a recovery in `window` that is prepared already.
+    ///
+    /// # Errors
+    /// If the limit is too low for one tile.
+    pub fn of_tiles(
+        limit: u64,
+        size: CaptureSize,
+        method: Method,
+        window: Window,
+        threads: usize,
+    ) -> Result<Self, TooLittleMemory> {
+        let size = CaptureSize {
+            gray_code: 0,
+            ..size
+        };
+        let none = CameraPixelSet::row_range(0..0, size.camera.width);
+        Self::with_sample(limit, size, method, Some(window), threads, none)
+    }
+
+    fn with_sample(
+        limit: u64,
+        size: CaptureSize,
+        method: Method,
+        window: Option<Window>,
+        threads: usize,
+        sample: CameraPixelSet,
+    ) -> Result<Self, TooLittleMemory> {
         let CaptureSize {
             camera,
             light,
@@ -98,7 +163,6 @@ impl MemoryPlan {
         let width = u64::from(camera.width);
         let fixed_bytes = PROGRAM_BYTES
             + method.preparation_bytes(max_window, shots) as u64
-            + PIXEL_BYTES * camera.area() as u64 // the dark frame
             + PIXEL_BYTES * (shots * light.area()) as u64 // patterns, of any colour
             + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width);
         // The functions of a tile as real numbers, as codes, and as byte planes to compress.
@@ -106,7 +170,7 @@ impl MemoryPlan {
         let tile = COMPRESSOR_BYTES
             + method.tile_bytes(max_window, shots) as u64
             + element * u64::from(TILE_SIDE * TILE_SIDE) * max_window.area() as u64;
-        let pixel_bytes = (photographs + 1) * PIXEL_BYTES; // and the flood photograph
+        let pixel_bytes = (photographs + 2) * PIXEL_BYTES; // and the flood photograph and the dark frame
         let row_bytes = pixel_bytes * width;
         // Photographs may be resampled while the recovery is prepared.
         let resampled = Method::resampled_bytes(shots) as u64;
@@ -116,12 +180,11 @@ impl MemoryPlan {
                 + camera.area() as u64 / RESAMPLED_BLOCK_PIXELS * RESAMPLED_BLOCK_BYTES
         };
         let gray_code_rows = gray_code_rows(camera);
-        let gray_code_pixel = gray_code as u64 * PIXEL_BYTES + POSITION_BYTES;
+        let gray_code_pixel = (gray_code as u64 + 1) * PIXEL_BYTES + POSITION_BYTES;
         let gray_code_bytes = match gray_code {
             0 => 0,
             _ => gray_code_pixel * width * gray_code_rows.count() as u64,
         };
-        let sample = preparation_pixels(camera, method, window);
         let sample_bytes = pixel_bytes * sample.count() as u64;
         let all_bytes = row_bytes * u64::from(camera.height);
         let min_rows = (TILE_SIDE + 2 * method.max_halo()).min(camera.height);
@@ -155,34 +218,7 @@ impl MemoryPlan {
                 false => u32::try_from(loaded_bytes / row_bytes.max(1)).unwrap_or(u32::MAX),
             },
             tiles_at_once: threads.min(((free - loaded_bytes) / tile) as usize),
-            threads,
-            limit,
         })
-    }
-
-    /// Number of tiles of the file encoded at once, after the photographs are unloaded, for `rank` components and
-    /// functions of `window`. The encoded file is not included.
-    ///
-    /// # Errors
-    /// If the limit is too low for one tile.
-    pub fn tiles_encoded_at_once(
-        &self,
-        window: Window,
-        rank: usize,
-    ) -> Result<usize, TooLittleMemory> {
-        let (fixed, tile) = encoding_bytes(self.camera, window, rank);
-        let (limit, min) = (self.limit, fixed + tile);
-        match limit < min {
-            true => Err(TooLittleMemory { limit, min }),
-            false => Ok(self.threads.min(((limit - fixed) / tile) as usize)),
-        }
-    }
-
-    /// The lowest limit, in bytes, with which a tile of a file can be encoded: of a picture of this size, with functions of
-    /// `window` and `rank` components.
-    pub fn min_encoding_bytes(camera: Extent, window: Window, rank: usize) -> u64 {
-        let (fixed, tile) = encoding_bytes(camera, window, rank);
-        fixed + tile
     }
 
     /// Number of tiles to recover at once.
@@ -337,6 +373,34 @@ mod tests {
                     .eq((0..camera.height).step_by(interval as usize))
             );
         }
+    }
+
+    #[test]
+    fn tiles_alone_take_less_memory_than_a_recovery() {
+        let window = Window::new(9).unwrap();
+        let size = CaptureSize {
+            camera: Extent::new(16_000, 16_000),
+            light: Extent::new(64, 64),
+            shots: 80,
+            gray_code: 24,
+        };
+        let of_tiles = |limit| MemoryPlan::of_tiles(limit, size, Method::Learned, window, 2);
+        let whole = MemoryPlan::new(0, size, Method::Learned, Some(window), 2).unwrap_err();
+        let min = of_tiles(0).unwrap_err().min;
+        assert!(min < whole.min, "{min} {}", whole.min);
+        let plan = of_tiles(min).unwrap();
+        assert_eq!(plan.strips(0..25, 8)[0], (0..1, 0..40));
+        // The rows of 80 photographs, with which the flood photograph and the dark frame may be.
+        let rows =
+            16_000 * 82 * PIXEL_BYTES * u64::from(TILE_SIDE + 2 * Method::Learned.max_halo());
+        assert!(min < rows + (1 << 30), "{min}");
+        let encoding = EncodingMemory::min_bytes(size.camera, window, 20);
+        assert!(encoding < min);
+        let encode =
+            |limit| EncodingMemory { limit, threads: 8 }.tiles_at_once(size.camera, window, 20);
+        assert_eq!(encode(encoding), Ok(1));
+        assert_eq!(encode(encoding - 1).unwrap_err().min, encoding);
+        assert_eq!(encode(4 << 30), Ok(8));
     }
 
     #[test]

@@ -16,7 +16,7 @@ mod tile_record;
 pub use capture_remedy::capture_remedy;
 pub use encoding::{FILE_TILE_SIDE, FileQuality, encode_file, file_geometry, file_tile};
 #[cfg(not(target_arch = "wasm32"))]
-pub use memory_plan::{CaptureSize, MemoryPlan, TooLittleMemory};
+pub use memory_plan::{CaptureSize, EncodingMemory, MemoryPlan, TooLittleMemory};
 pub use metadata::{Provenance, metadata};
 pub use preparation::{
     ExportSettings, MIN_PLAUSIBLE_SNR, PreparedExport, has_implausible_saturation,

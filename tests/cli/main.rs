@@ -10,6 +10,7 @@ mod check;
 mod commands;
 mod enlargement;
 mod import;
+mod ingest;
 mod levels;
 mod photo_files;
 mod photographs;

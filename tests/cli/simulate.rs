@@ -112,15 +112,15 @@ fn photographs_and_relit_pictures_match_the_known_transport() {
         let folder = CaptureFolder::open(&out).unwrap();
         assert_eq!(folder.manifest().shots.len(), 6);
 
-        let dark = folder.read_dark().unwrap();
+        let pixels = CameraPixelSet::all(folder.manifest().camera.extent());
+        let dark = folder.read_dark(&pixels).unwrap();
         let (mut squares, mut samples) = (0.0, 0.0);
         for i in 0..6 {
             let Pattern::Grey(pattern) = folder.read_pattern(i).unwrap() else {
                 panic!("patterns are grey")
             };
-            let (mut shot, mut photo) = (folder.open_shot(i, &dark).unwrap(), LinearPhoto::new());
-            let pixels = CameraPixelSet::all(folder.manifest().camera.extent());
-            shot.read(&pixels, &mut photo).unwrap();
+            let (mut shot, mut photo) = (folder.open_shot(i).unwrap(), LinearPhoto::new());
+            shot.read(&pixels, &dark, &mut photo).unwrap();
             assert_eq!(shot.finish().unwrap().saturated, 0, "saturated samples");
             let light: Vec<_> = pattern.iter().map(|&p| [f64::from(p); CHANNELS]).collect();
             for (expected, measured) in picture(&folder, &light).iter().zip(&photo) {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
-fn text(path: &Path) -> &str {
+pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
@@ -27,7 +27,7 @@ fn run(args: &[&str]) -> Output {
 }
 
 /// Runs a command that must succeed.
-fn succeeds(args: &[&str]) -> Output {
+pub fn succeeds(args: &[&str]) -> Output {
     let output = run(args);
     assert!(
         output.status.success(),
@@ -38,7 +38,7 @@ fn succeeds(args: &[&str]) -> Output {
 }
 
 /// Runs a command that must fail with this status and these words.
-fn fails(args: &[&str], status: i32, words: &[&str]) {
+pub fn fails(args: &[&str], status: i32, words: &[&str]) {
     let output = run(args);
     let said = stderr_text(&output);
     assert_eq!(output.status.code(), Some(status), "{args:?}: {said}");
@@ -48,19 +48,19 @@ fn fails(args: &[&str], status: i32, words: &[&str]) {
 }
 
 /// Options of a recovery that learns a prior, and of one that takes less time.
-const LEARNED: [&str; 2] = ["--window", "5"];
-const NNLS: [&str; 4] = ["--window", "5", "--method", "nnls"];
+pub const LEARNED: [&str; 2] = ["--window", "5"];
+pub const NNLS: [&str; 4] = ["--window", "5", "--method", "nnls"];
 
 /// A capture of so many camera pixels, and a folder of stages.
-struct Job {
+pub struct Job {
     options: &'static [&'static str],
     folder: TempDir,
-    capture: PathBuf,
+    pub capture: PathBuf,
     stages: PathBuf,
 }
 
 impl Job {
-    fn new(camera: &str, faults: &[&str], options: &'static [&'static str]) -> Self {
+    pub fn new(camera: &str, faults: &[&str], options: &'static [&'static str]) -> Self {
         let folder = TempDir::new().unwrap();
         let [capture, stages] = ["capture", "stages"].map(|name| folder.path().join(name));
         let clean = folder.path().join("clean");
@@ -79,15 +79,15 @@ impl Job {
         }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn pack(&self, name: &str) -> PathBuf {
+    pub fn pack(&self, name: &str) -> PathBuf {
         self.stages.join("shards").join(name)
     }
 
-    fn plan(&self, options: &[&str]) {
+    pub fn plan(&self, options: &[&str]) {
         let args = [
             "stage",
             "plan",
@@ -98,20 +98,20 @@ impl Job {
         succeeds(&[&args[..], self.options, options].concat());
     }
 
-    fn learn(&self) -> Output {
+    pub fn learn(&self) -> Output {
         succeeds(&["stage", "learn", text(&self.stages)])
     }
 
-    fn tiles_args<'a>(&'a self, shard: &'a str) -> [&'a str; 5] {
+    pub fn tiles_args<'a>(&'a self, shard: &'a str) -> [&'a str; 5] {
         ["stage", "tiles", text(&self.stages), "--shard", shard]
     }
 
-    fn tiles(&self, shard: &str) -> Output {
+    pub fn tiles(&self, shard: &str) -> Output {
         succeeds(&self.tiles_args(shard))
     }
 
     /// The bytes of the file, and the report without what differs from run to run.
-    fn assemble(&self, shards: usize) -> (Vec<u8>, Value) {
+    pub fn assemble(&self, shards: usize) -> (Vec<u8>, Value) {
         let (file, shards) = (self.path("assembled.ltm"), shards.to_string());
         let args = ["stage", "assemble", text(&self.stages), "--shards", &shards];
         let output = succeeds(&[&args[..], &["-o", text(&file), "--json"]].concat());
@@ -119,7 +119,7 @@ impl Job {
     }
 
     /// As [`assemble`](Self::assemble), by `recover`.
-    fn recover(&self, options: &[&str]) -> (Vec<u8>, Value) {
+    pub fn recover(&self, options: &[&str]) -> (Vec<u8>, Value) {
         let file = self.path("recovered.ltm");
         let args = ["recover", text(&self.capture), "-o", text(&file), "--json"];
         let output = succeeds(&[&args[..], self.options, options].concat());

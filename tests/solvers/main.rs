@@ -173,7 +173,8 @@ fn embedded_fixture_equals_its_folder() {
 
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/glass-s");
     let folder = CaptureFolder::open(root.as_ref()).unwrap();
-    let dark = folder.read_dark().unwrap();
+    let camera = folder.manifest().camera.extent();
+    let dark = folder.read_dark(&CameraPixelSet::all(camera)).unwrap();
     let embedded = glass_s::measurements();
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
     let patterns = shots.iter().map(|&i| folder.read_pattern(i).unwrap());
@@ -183,12 +184,10 @@ fn embedded_fixture_equals_its_folder() {
     read.loaded = CameraPixelSet::all(read.camera);
     let whole = |mut photo: PhotographRowReader| {
         let mut picture = LinearPhoto::new();
-        photo.read(&read.loaded, &mut picture).unwrap();
+        photo.read(&read.loaded, &dark, &mut picture).unwrap();
         picture
     };
-    let pictures = shots
-        .iter()
-        .map(|&i| whole(folder.open_shot(i, &dark).unwrap()));
+    let pictures = shots.iter().map(|&i| whole(folder.open_shot(i).unwrap()));
     read.photos = pictures.collect();
     read.noise = NoiseModel::with_gain_from(&read);
     assert_eq!((embedded.camera, embedded.light), (read.camera, read.light));

@@ -3,28 +3,42 @@
 //! The manifest is checked when the folder is opened; patterns and photographs are read one by one, so that callers may
 //! read them in parallel.
 
-mod capture_png;
+mod dark_frame;
 mod disk_files;
 mod files;
+#[cfg(not(target_arch = "wasm32"))]
+mod ingest;
+#[cfg(not(target_arch = "wasm32"))]
+mod ingest_record;
+mod photograph_codes;
 mod photograph_row_reader;
 #[cfg(not(target_arch = "wasm32"))]
 mod photograph_scan;
+mod picture_file;
+mod picture_png;
+#[cfg(not(target_arch = "wasm32"))]
+mod picture_tiff;
 #[cfg(not(target_arch = "wasm32"))]
 mod truth;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+pub use self::dark_frame::{DarkFrame, DarkFrameReader};
 pub use self::disk_files::DiskFiles;
 pub use self::files::CaptureFiles;
-pub use self::photograph_row_reader::{DarkFrame, PhotographRowReader};
+#[cfg(not(target_arch = "wasm32"))]
+pub use self::ingest::{IngestError, IngestedPhotograph};
+#[cfg(not(target_arch = "wasm32"))]
+pub use self::ingest_record::IngestSource;
+pub use self::photograph_row_reader::PhotographRowReader;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::photograph_scan::PhotographScan;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::truth::{GroundTruth, RELIT_FULL_SCALE};
 
-use self::capture_png::CapturePng;
 use self::files::CaptureFile;
+use self::picture_file::PictureFile;
 use super::camera_pixel_set::CameraPixelSet;
 use super::camera_row_set::CameraRowSet;
 use super::code_statistics::CodeStatistics;
@@ -38,12 +52,12 @@ use crate::transport::{CHANNELS, Correspondence, Extent};
 /// Reads the size and the codes of a photograph that no manifest lists.
 ///
 /// # Errors
-/// If it is missing or not a 16-bit PNG.
+/// If it is missing or not a 16-bit photograph.
 pub fn read_unlisted_photo<F: CaptureFiles>(
     files: &F,
     name: &str,
 ) -> Result<(Extent, Vec<[u16; CHANNELS]>), CaptureError> {
-    CapturePng::unlisted(files, name).read_rgb16()
+    PictureFile::unlisted(files, name).read_codes()
 }
 
 /// Reads the size and the emission of a pattern that no manifest lists; `emission` is that of each code.
@@ -55,7 +69,7 @@ pub fn read_unlisted_pattern<F: CaptureFiles>(
     name: &str,
     emission: &[f64; 256],
 ) -> Result<(Extent, Pattern), CaptureError> {
-    CapturePng::unlisted(files, name).read_pattern(emission)
+    PictureFile::unlisted(files, name).read_pattern(emission)
 }
 
 /// A capture folder with its checked manifest.
@@ -181,7 +195,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         names.into_iter().map(path).collect()
     }
 
-    /// Reads `rows` of the Gray code photographs.
+    /// Reads `rows` of the Gray code photographs; `dark` was read there.
     ///
     /// # Errors
     /// If the manifest lacks one of the bits, plain or inverted, or a photograph cannot be read.
@@ -197,7 +211,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         })
     }
 
-    /// Reads `rows` of the photographs of one bit of an axis.
+    /// Reads `rows` of the photographs of one bit of an axis; `dark` was read there.
     ///
     /// # Errors
     /// Those of [`read_gray_code`](Self::read_gray_code).
@@ -230,64 +244,62 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             return Err(CaptureError::new(self.manifest_path(), problem));
         };
         let field = format!("graycode[{i}].photo");
-        let mut reader = self.open_photo(&self.manifest.graycode[i].photo, field, 1.0, dark)?;
+        let mut reader = self.open_photo(&self.manifest.graycode[i].photo, field, 1.0)?;
         let mut photo = LinearPhoto::new();
         let pixels = CameraPixelSet::of_rows(rows.clone(), self.manifest.camera.width);
-        reader.read(&pixels, &mut photo)?;
+        reader.read(&pixels, dark, &mut photo)?;
         reader.finish()?;
         Ok(photo)
     }
 
-    /// Reads the dark frame; zeros if there is none.
+    /// Reads `pixels` of the dark frame; zeros if there is none.
     ///
     /// # Errors
     /// If the photograph cannot be read.
-    pub fn read_dark(&self) -> Result<DarkFrame, CaptureError> {
+    pub fn read_dark(&self, pixels: &CameraPixelSet) -> Result<DarkFrame, CaptureError> {
+        let mut reader = self.open_dark()?;
+        let dark = reader.read(pixels)?;
+        reader.finish()?;
+        Ok(dark)
+    }
+
+    /// Opens the dark frame, if there is one.
+    ///
+    /// # Errors
+    /// If it is missing, or not a 16-bit photograph of the camera's size.
+    pub fn open_dark(&self) -> Result<DarkFrameReader<'_, F>, CaptureError> {
         let camera = &self.manifest.camera;
-        let light = match &self.manifest.dark {
-            None => vec![[0.0; CHANNELS]; camera.extent().area()],
-            Some(name) => {
-                let field = Some("dark".to_owned());
-                let file = CapturePng::new(&self.files, name, camera.extent(), field);
-                let (_, codes) = file.read_rgb16()?;
-                let linear = |code| camera.linear(code, 1.0);
-                codes.into_iter().map(|codes| codes.map(linear)).collect()
-            }
-        };
-        let code = 1.0 / (camera.white - camera.black);
-        let noise = NoiseModel::from_dark(&light, camera.width, code);
-        Ok(DarkFrame { light, noise })
+        let open = |name| self.photograph(name, "dark".to_owned()).open_codes();
+        let dark = self.manifest.dark.as_deref();
+        Ok(DarkFrameReader {
+            camera,
+            codes: dark.map(open).transpose()?,
+            next_row: 0,
+        })
     }
 
     /// Opens the flood photograph, if the manifest names one, as it were if the display did not dim.
     ///
     /// # Errors
-    /// If it is missing or not a 16-bit PNG of the camera's size.
-    pub fn open_flood<'a>(
-        &'a self,
-        dark: &'a DarkFrame,
-    ) -> Result<Option<PhotographRowReader<'a, F>>, CaptureError> {
-        let flood = self.manifest.flood.as_ref();
+    /// If it is missing or not a 16-bit photograph of the camera's size.
+    pub fn open_flood(&self) -> Result<Option<PhotographRowReader<'_, F>>, CaptureError> {
+        let flood = self.manifest.flood.as_deref();
         let brightness = 1.0 - self.manifest.light.dimming.unwrap_or(0.0);
-        let open = |name: &'a String| self.open_photo(name, "flood".to_owned(), brightness, dark);
+        let open = |name| self.open_photo(name, "flood".to_owned(), brightness);
         flood.map(open).transpose()
     }
 
     /// Opens the photograph of shot `i`.
     ///
     /// # Errors
-    /// If it is missing or not a 16-bit PNG of the camera's size.
+    /// If it is missing or not a 16-bit photograph of the camera's size.
     ///
     /// # Panics
     /// If there is no such shot.
-    pub fn open_shot<'a>(
-        &'a self,
-        i: usize,
-        dark: &'a DarkFrame,
-    ) -> Result<PhotographRowReader<'a, F>, CaptureError> {
+    pub fn open_shot(&self, i: usize) -> Result<PhotographRowReader<'_, F>, CaptureError> {
         let field = format!("shots[{i}].photo");
         let name = &self.manifest.shots[i].photo;
-        self.open_photo(name, field, self.exposure(i), dark)
+        self.open_photo(name, field, self.exposure(i))
     }
 
     /// Reads the pattern of shot `i`, as emission.
@@ -300,7 +312,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
     pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
         let name = &self.manifest.shots[i].pattern;
         let (light, field) = (self.manifest.light.extent(), format!("shots[{i}].pattern"));
-        let file = CapturePng::new(&self.files, name, light, Some(field));
+        let file = PictureFile::new(&self.files, name, light, Some(field));
         let (_, mut pattern) = file.read_pattern(&self.emission)?;
         self.manifest.light.dim(&mut pattern);
         Ok(pattern)
@@ -341,17 +353,19 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         name: &'a str,
         field: String,
         exposure: f64,
-        dark: &'a DarkFrame,
     ) -> Result<PhotographRowReader<'a, F>, CaptureError> {
-        let camera = &self.manifest.camera;
-        let file = CapturePng::new(&self.files, name, camera.extent(), Some(field));
         Ok(PhotographRowReader {
-            camera,
-            dark,
+            camera: &self.manifest.camera,
             exposure,
-            codes: file.open_rgb16()?,
+            codes: self.photograph(name, field).open_codes()?,
             next_row: 0,
             statistics: CodeStatistics::of_photograph(),
         })
+    }
+
+    /// The photograph `name`, which `field` of the manifest names.
+    fn photograph<'a>(&'a self, name: &'a str, field: String) -> PictureFile<'a, F> {
+        let extent = self.manifest.camera.extent();
+        PictureFile::new(&self.files, name, extent, Some(field))
     }
 }

@@ -1,8 +1,8 @@
 //! A photograph that is decoded once, for all that is asked of it: the codes of some pixels, and statistics of all codes.
 
 use super::CaptureFolder;
-use super::capture_png::CapturePng;
 use super::files::CaptureFiles;
+use super::picture_file::PictureFile;
 use crate::capture::camera_pixel_set::CameraPixelSet;
 use crate::capture::code_statistics::CodeStatistics;
 use crate::capture::error::CaptureError;
@@ -24,14 +24,14 @@ impl<F: CaptureFiles> CaptureFolder<F> {
     /// Decodes a photograph that the manifest names, and keeps the codes of `pixels`.
     ///
     /// # Errors
-    /// If it is missing, not a 16-bit PNG of the camera's size, or damaged.
+    /// If it is missing, not a 16-bit photograph of the camera's size, or damaged.
     pub fn scan(
         &self,
         photograph: ListedPhotograph<'_>,
         pixels: &CameraPixelSet,
     ) -> Result<PhotographScan, CaptureError> {
         let camera = &self.manifest.camera;
-        let mut reader = self.png(photograph).open_rgb16()?;
+        let mut reader = self.listed(photograph).open_codes()?;
         let saturated_from = camera.saturated_from();
         let mut scan = PhotographScan {
             pixels: Vec::with_capacity(pixels.count()),
@@ -49,21 +49,19 @@ impl<F: CaptureFiles> CaptureFolder<F> {
                 scan.pixels.extend_from_slice(&codes[span]);
             }
         }
-        reader.finish()?;
+        reader.finish(saturated_from)?;
         Ok(scan)
     }
 
     /// Looks whether a photograph that the manifest names exists and has the right type and size, without decoding it.
     ///
     /// # Errors
-    /// If it is missing, or not a 16-bit PNG of the camera's size.
+    /// If it is missing, or not a 16-bit photograph of the camera's size.
     pub fn check_header(&self, photograph: ListedPhotograph<'_>) -> Result<(), CaptureError> {
-        self.png(photograph).open_rgb16().map(drop)
+        self.listed(photograph).open_codes().map(drop)
     }
 
-    fn png<'a>(&'a self, photograph: ListedPhotograph<'a>) -> CapturePng<'a, F> {
-        let field = Some(photograph.role.field());
-        let extent = self.manifest.camera.extent();
-        CapturePng::new(&self.files, photograph.name, extent, field)
+    pub(super) fn listed<'a>(&'a self, photograph: ListedPhotograph<'a>) -> PictureFile<'a, F> {
+        self.photograph(photograph.name, photograph.role.field())
     }
 }

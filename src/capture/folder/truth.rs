@@ -9,8 +9,8 @@ use std::path::Path;
 use half::f16;
 use npyz::NpyFile;
 
-use super::capture_png::CapturePng;
 use super::disk_files::DiskFiles;
+use super::picture_file::PictureFile;
 use crate::capture::error::{CaptureError, CaptureErrorKind};
 use crate::capture::manifest::Manifest;
 use crate::capture::measurements::Pattern;
@@ -110,7 +110,7 @@ impl GroundTruth {
     /// If its picture cannot be read.
     pub fn light(&self, name: &str) -> Result<Pattern, CaptureError> {
         let name = format!("light_{name}.png");
-        let file = CapturePng::new(&self.files, &name, self.light_plane, None);
+        let file = PictureFile::new(&self.files, &name, self.light_plane, None);
         Ok(file.read_pattern(&self.emission)?.1)
     }
 
@@ -120,8 +120,8 @@ impl GroundTruth {
     /// If it cannot be read.
     pub fn relit(&self, name: &str) -> Result<Vec<[f64; CHANNELS]>, CaptureError> {
         let name = format!("relit_{name}.png");
-        let file = CapturePng::new(&self.files, &name, self.camera, None);
-        let codes = file.read_rgb16()?.1.into_iter();
+        let file = PictureFile::new(&self.files, &name, self.camera, None);
+        let codes = file.read_codes()?.1.into_iter();
         let linear = |code| f64::from(code) / RELIT_FULL_SCALE;
         Ok(codes.map(|codes| codes.map(linear)).collect())
     }

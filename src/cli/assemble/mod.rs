@@ -31,7 +31,7 @@ use super::progress;
 use super::value_parsers::UsageError;
 use crate::acquisition::{PatternSequence, SEQUENCE_NAME};
 use crate::calibrate::GrayCodeFit;
-use crate::capture::{CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME};
+use crate::capture::{CameraPixelSet, CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME};
 use crate::transport::{Extent, TileRect};
 
 /// Rows of the Gray code that are decoded, at most.
@@ -199,13 +199,13 @@ pub fn ensure_new(folder: &Path) -> Result<()> {
 pub fn fit_gray_code(folder: &Path) -> Result<GrayCodeFit> {
     let folder = CaptureFolder::open(folder)?;
     let _spinner = progress::spinner("decoding");
-    let dark = folder.read_dark()?;
     let camera = folder.manifest().camera.extent();
     let count = GRAY_CODE_ROWS.min(camera.height);
     let row = |i: u32| (u64::from(i) * u64::from(camera.height) / u64::from(count)) as u32;
     let rows = (0..count).map(|i| row(i)..row(i) + 1);
     let rows = CameraRowSet::from_strips(rows);
-    let gray_code = folder.read_gray_code(&dark, &rows)?;
+    let pixels = CameraPixelSet::of_rows(rows.clone(), camera.width);
+    let gray_code = folder.read_gray_code(&folder.read_dark(&pixels)?, &rows)?;
     let fit = gray_code.fit(camera);
     fit.with_context(|| folder.manifest_path().display().to_string())
 }

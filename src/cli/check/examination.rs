@@ -99,7 +99,7 @@ impl<'a> Examination<'a> {
     fn conclude(
         &self,
         preparation: &CapturePreparation<'_, &ScannedCapture<'_>>,
-        sample: &CaptureSample<()>,
+        sample: &CaptureSample,
         prepared: Result<PreparedExport, RecoverError>,
         cause: Option<Finding>,
         findings: &mut Findings,
@@ -144,7 +144,7 @@ impl<'a> Examination<'a> {
         }
     }
 
-    fn add_pixels_and_noise(&self, sample: &CaptureSample<()>, findings: &mut Findings) {
+    fn add_pixels_and_noise(&self, sample: &CaptureSample, findings: &mut Findings) {
         let (pixels, area) = (
             self.scanned.shot_pixels().count(),
             sample.measurements.camera.area(),

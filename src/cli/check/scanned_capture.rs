@@ -166,12 +166,12 @@ impl<'a> ScannedCapture<'a> {
     ///
     /// # Errors
     /// If a pattern cannot be read any more.
-    pub fn sample(&self, folder: CaptureFolder, shots: Vec<usize>) -> Result<CaptureSample<()>> {
+    pub fn sample(&self, folder: CaptureFolder, shots: Vec<usize>) -> Result<CaptureSample> {
         let manifest = folder.manifest();
         let camera = &manifest.camera;
         let dark = self.dark_of(PhotographRole::Flood, camera);
         let code = (camera.white - camera.black).recip();
-        let noise = NoiseModel::from_dark(&dark, camera.width, code);
+        let noise = NoiseModel::from_dark_rows(&self.sampled.shots.split(&dark), code);
         let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
         let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
         let declared = manifest.correspondence.as_ref();
@@ -200,7 +200,6 @@ impl<'a> ScannedCapture<'a> {
         Ok(CaptureSample {
             folder,
             shots,
-            dark: (),
             measurements,
             read,
         })
@@ -208,24 +207,22 @@ impl<'a> ScannedCapture<'a> {
 }
 
 impl PhotographSource for &ScannedCapture<'_> {
-    type Dark = ();
-
     fn cores(&self) -> &InterruptibleCores {
         self.cores
     }
 
     fn read_shots(
         &self,
-        sample: CaptureSample<()>,
+        sample: CaptureSample,
         shots: Vec<usize>,
         manifest: Manifest,
-    ) -> Result<CaptureSample<()>> {
+    ) -> Result<CaptureSample> {
         let folder = sample.folder.with_manifest(manifest);
         drop(sample);
         self.sample(folder, shots)
     }
 
-    fn finest_contrasts(&self, _: &CaptureSample<()>) -> Option<[f32; 2]> {
+    fn finest_contrasts(&self, _: &CaptureSample) -> Option<[f32; 2]> {
         self.contrasts
     }
 }

@@ -4,7 +4,9 @@ use anyhow::Result;
 use serde::Serialize;
 
 use super::figures::{Histogram, histogram, reduced, white_of};
-use crate::capture::{CaptureFolder, LinearPhoto, NoiseModel, PhotographRowReader};
+use crate::capture::{
+    CameraPixelSet, CaptureFolder, DarkFrame, LinearPhoto, NoiseModel, PhotographRowReader,
+};
 use crate::cli::evaluate::SampleMoments;
 use crate::cli::finest_level::FinestLevel;
 use crate::cli::process_resources::InterruptibleCores;
@@ -125,7 +127,7 @@ impl Predictions {
         cores: &InterruptibleCores,
     ) -> Result<Self> {
         let geometry = file.geometry.clone();
-        let dark = folder.read_dark()?;
+        let dark = folder.read_dark(&CameraPixelSet::all(geometry.camera))?;
         let mut found = Self {
             camera: geometry.camera,
             flood: None,
@@ -143,13 +145,13 @@ impl Predictions {
             let variance = |c: usize, y: f64| {
                 noise.map_or(0.0, |noise| noise.variance(c, y, folder.exposure(i)))
             };
-            let (predicted, measured) = predict(file, &light, folder.open_shot(i, &dark)?)?;
+            let (predicted, measured) = predict(file, &light, folder.open_shot(i)?, &dark)?;
             let photo = folder.manifest().shots[i].photo.clone();
             found.compare(i, photo, &predicted, &measured, variance);
         }
         let flood = BuiltinLight::Flood.render(geometry.light);
-        if let Some(reader) = folder.open_flood(&dark)? {
-            let (predicted, measured) = predict(file, &flood, reader)?;
+        if let Some(reader) = folder.open_flood()? {
+            let (predicted, measured) = predict(file, &flood, reader, &dark)?;
             let mut snr = SnrAccumulator::default();
             for (predicted, measured) in samples(&predicted, &measured) {
                 snr.add(measured, predicted);
@@ -281,8 +283,9 @@ fn predict(
     file: &mut FinestLevel,
     light: &Light,
     reader: PhotographRowReader,
+    dark: &DarkFrame,
 ) -> Result<(Vec<[f32; CHANNELS]>, LinearPhoto)> {
-    let (photo, _) = reader.read_all()?;
+    let (photo, _) = reader.read_all(dark)?;
     Ok((file.picture(light)?, photo))
 }
 

@@ -3,12 +3,13 @@
 use anyhow::Result;
 
 use crate::calibrate::LightPlaneAxis;
-use crate::capture::{CameraRowSet, CaptureFolder, DarkFrame, Manifest, Measurements};
+use crate::capture::{CameraPixelSet, CameraRowSet, CaptureFolder, Manifest, Measurements};
 use crate::cli::measurement_reader::{
     MeasurementReader, ReadSample, read_patterns, read_sample_of,
 };
 use crate::cli::process_resources::InterruptibleCores;
 use crate::export::MemoryPlan;
+use crate::transport::Extent;
 
 /// Camera rows from which the contrast of Gray code is measured.
 const MAX_CONTRAST_ROWS: u32 = 128;
@@ -17,18 +18,11 @@ const AXES: [LightPlaneAxis; 2] = [LightPlaneAxis::X, LightPlaneAxis::Y];
 
 /// Where a preparation gets its photographs from.
 pub trait PhotographSource {
-    /// What a sample keeps of the dark frame.
-    type Dark;
-
     /// What runs jobs, and may be cancelled.
     fn cores(&self) -> &InterruptibleCores;
 
     /// The same photographs by another manifest. They are not read again if they were read by that.
-    fn read_by(
-        &self,
-        sample: CaptureSample<Self::Dark>,
-        manifest: Manifest,
-    ) -> Result<CaptureSample<Self::Dark>> {
+    fn read_by(&self, sample: CaptureSample, manifest: Manifest) -> Result<CaptureSample> {
         if *sample.folder.manifest() == manifest {
             return Ok(sample);
         }
@@ -39,14 +33,14 @@ pub trait PhotographSource {
     /// The photographs of other shots by another manifest.
     fn read_shots(
         &self,
-        sample: CaptureSample<Self::Dark>,
+        sample: CaptureSample,
         shots: Vec<usize>,
         manifest: Manifest,
-    ) -> Result<CaptureSample<Self::Dark>>;
+    ) -> Result<CaptureSample>;
 
     /// The contrasts of bits 0 and 1 of the Gray code in the sharpest camera pixels, each along the axis where it is lower.
     /// `None` if these photographs are missing, as nothing else needs them where the correspondence is declared.
-    fn finest_contrasts(&self, sample: &CaptureSample<Self::Dark>) -> Option<[f32; 2]>;
+    fn finest_contrasts(&self, sample: &CaptureSample) -> Option<[f32; 2]>;
 }
 
 /// Reads photographs whole if they fit in memory, otherwise the pixels that the preparation reads.
@@ -57,11 +51,10 @@ pub struct SampleSource<'a> {
 }
 
 /// Measurements of the pixels that a recovery is prepared from, or of all, as the manifest says.
-pub struct CaptureSample<D = DarkFrame> {
+pub struct CaptureSample {
     pub folder: CaptureFolder,
     /// Indices of the shots.
     pub shots: Vec<usize>,
-    pub dark: D,
     pub measurements: Measurements,
     pub read: ReadSample,
 }
@@ -74,22 +67,22 @@ impl SampleSource<'_> {
         shots: Vec<usize>,
         opened: impl FnOnce() -> Result<()>,
     ) -> Result<CaptureSample> {
-        let dark = folder.read_dark()?;
-        let flood = folder.open_flood(&dark)?;
-        let mut measurements = read_patterns(&folder, &dark, &shots, self.plan.gray_code_rows())?;
-        let reader = MeasurementReader::open(&folder, &dark, &shots)?;
-        opened()?;
         let pixels = self.plan.sample();
-        let mut read = reader.read_sample(&mut measurements, pixels, self.cores)?;
+        let dark = folder.read_dark(pixels)?;
+        let flood = folder.open_flood()?;
+        let gray_code_rows = self.plan.gray_code_rows();
+        let mut measurements = read_patterns(&folder, dark.noise(), &shots, gray_code_rows)?;
+        let reader = MeasurementReader::open(&folder, &shots)?;
+        opened()?;
+        let mut read = reader.read_sample(&mut measurements, &dark, pixels, self.cores)?;
         if let Some(flood) = flood {
-            let (samples, codes) = read_sample_of(flood, pixels)?;
+            let (samples, codes) = read_sample_of(flood, &dark, pixels)?;
             measurements.flood = Some(samples);
             read.flood_codes = Some(codes);
         }
         Ok(CaptureSample {
             folder,
             shots,
-            dark,
             measurements,
             read,
         })
@@ -97,8 +90,6 @@ impl SampleSource<'_> {
 }
 
 impl PhotographSource for SampleSource<'_> {
-    type Dark = DarkFrame;
-
     fn cores(&self) -> &InterruptibleCores {
         self.cores
     }
@@ -117,12 +108,14 @@ impl PhotographSource for SampleSource<'_> {
 
     fn finest_contrasts(&self, sample: &CaptureSample) -> Option<[f32; 2]> {
         // A few, as the photographs are in memory.
-        let height = sample.measurements.camera.height;
+        let Extent { width, height } = sample.measurements.camera;
         let step = height.div_ceil(MAX_CONTRAST_ROWS);
         let rows = (0..height).step_by(step as usize).map(|y| y..y + 1);
         let rows = CameraRowSet::from_strips(rows);
+        let pixels = CameraPixelSet::of_rows(rows.clone(), width);
+        let dark = sample.folder.read_dark(&pixels).ok()?;
         let contrast = |axis, bit| {
-            let photos = (sample.folder).read_gray_code_bit(&sample.dark, &rows, axis, bit);
+            let photos = sample.folder.read_gray_code_bit(&dark, &rows, axis, bit);
             photos.ok()?.best_contrast()
         };
         let lower = |bit| {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::inputs::RecoveryInputs;
-use crate::capture::{CaptureError, CaptureErrorKind};
+use crate::capture::{CaptureError, CaptureErrorKind, IngestedPhotograph};
 use crate::cli::process_resources::{Interrupted, InterruptibleCores};
 use crate::cli::value_parsers::value_name;
 use crate::export::MemoryPlan;
@@ -124,7 +124,8 @@ pub fn file_digests(
     files.into_par_iter().map(digest).collect()
 }
 
-/// Length and CRC-32C of a file.
+/// Length and CRC-32C of a file; of a photograph that was ingested, the CRC-32C of its record, which has the checksums of its
+/// strips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileDigest {
     pub bytes: u64,
@@ -132,13 +133,30 @@ pub struct FileDigest {
 }
 
 impl FileDigest {
-    /// Reads the whole file, which is one of a capture.
+    /// Reads the file, which is one of a capture.
     pub fn of(path: &Path) -> Result<Self, CaptureError> {
+        if let Some(digest) = Self::of_record(path)? {
+            return Ok(digest);
+        }
         let read = || -> io::Result<Self> {
             let mut reader = Crc32cReader::new(File::open(path)?);
             let bytes = io::copy(&mut reader, &mut io::sink())?;
             let crc = reader.crc32c();
             Ok(Self { bytes, crc })
+        };
+        read().map_err(|e| CaptureError::new(path, CaptureErrorKind::Io(e)))
+    }
+
+    /// Reads the record of a photograph that was ingested; `None` of other files.
+    pub fn of_record(path: &Path) -> Result<Option<Self>, CaptureError> {
+        let read = || -> io::Result<Option<Self>> {
+            let Some(ingested) = IngestedPhotograph::read(path)? else {
+                return Ok(None);
+            };
+            Ok(Some(Self {
+                bytes: path.metadata()?.len(),
+                crc: ingested.checksum,
+            }))
         };
         read().map_err(|e| CaptureError::new(path, CaptureErrorKind::Io(e)))
     }

@@ -7,9 +7,11 @@ use super::messages;
 use crate::capture::CaptureFolder;
 use crate::cli::levels_output::levels_of;
 use crate::cli::value_parsers::ByteCount;
-use crate::export::{CaptureSize, FILE_TILE_SIDE, MemoryPlan, TooLittleMemory, select_shots};
+use crate::export::{
+    CaptureSize, EncodingMemory, FILE_TILE_SIDE, MemoryPlan, TooLittleMemory, select_shots,
+};
 use crate::recover::{MIN_PATTERNS, RecoverError};
-use crate::transport::Window;
+use crate::transport::{Geometry, Window};
 
 /// A capture, and what is recovered from it.
 pub struct RecoveryInputs<'a> {
@@ -62,21 +64,12 @@ impl<'a> RecoveryInputs<'a> {
     /// # Errors
     /// If they are too few.
     pub fn memory_plan(&self, limit: ByteCount) -> Result<MemoryPlan> {
-        let (manifest, method) = (self.folder.manifest(), self.options.method());
+        let (capture, method) = (self.capture_size(), self.options.method());
         let window = self.options.window;
-        let capture = CaptureSize {
-            camera: manifest.camera.extent(),
-            light: manifest.light.extent(),
-            shots: self.shots.len(),
-            gray_code: match manifest.correspondence {
-                Some(_) => 0,
-                None => manifest.graycode.len(),
-            },
-        };
         // The file of an estimated window may take more.
         let encoding = window.map_or(0, |window| {
             let components = encoded_components(self.levels, window, method.max_rank(window));
-            MemoryPlan::min_encoding_bytes(capture.camera, window, components)
+            EncodingMemory::min_bytes(capture.camera, window, components)
         });
         let (limit, threads) = (limit.0, rayon::current_num_threads());
         match MemoryPlan::new(limit, capture, method, window, threads) {
@@ -87,14 +80,52 @@ impl<'a> RecoveryInputs<'a> {
             }
         }
     }
+
+    /// How the recovery of tiles in `window` uses at most `limit` bytes.
+    ///
+    /// # Errors
+    /// If they are too few.
+    pub fn tiles_memory_plan(&self, limit: ByteCount, window: Window) -> Result<MemoryPlan> {
+        let (capture, method) = (self.capture_size(), self.options.method());
+        let threads = rayon::current_num_threads();
+        MemoryPlan::of_tiles(limit.0, capture, method, window, threads)
+            .map_err(messages::too_little_memory)
+    }
+
+    fn capture_size(&self) -> CaptureSize {
+        let manifest = self.folder.manifest();
+        CaptureSize {
+            camera: manifest.camera.extent(),
+            light: manifest.light.extent(),
+            shots: self.shots.len(),
+            gray_code: match manifest.correspondence {
+                Some(_) => 0,
+                None => manifest.graycode.len(),
+            },
+        }
+    }
+}
+
+/// The memory for encoding within `limit` bytes, by all threads of the present pool.
+pub fn encoding_memory(limit: ByteCount) -> EncodingMemory {
+    EncodingMemory {
+        limit: limit.0,
+        threads: rayon::current_num_threads(),
+    }
 }
 
 /// Number of tiles of a file of so many levels that are encoded at once, if those of the recovery have `rank` components.
 ///
 /// # Errors
 /// If the memory is too little for one.
-pub fn encoders(plan: &MemoryPlan, levels: u32, window: Window, rank: usize) -> Result<usize> {
-    let encoders = plan.tiles_encoded_at_once(window, encoded_components(levels, window, rank));
+pub fn encoders(
+    memory: EncodingMemory,
+    geometry: &Geometry,
+    levels: u32,
+    rank: usize,
+) -> Result<usize> {
+    let components = encoded_components(levels, geometry.window, rank);
+    let encoders = memory.tiles_at_once(geometry.camera, geometry.window, components);
     encoders.map_err(messages::too_little_memory)
 }
 

@@ -15,6 +15,7 @@ use super::ltm_writer::{Destination, finish};
 use super::prepared_job::PreparedJob;
 use super::report::RecoverReport;
 use super::tile_recovery::{TilePhotographs, TileRecovery};
+use crate::export::EncodingMemory;
 use crate::job_executor::Cancelled;
 use crate::recover::PreparedRecovery;
 use crate::transport::Basis;
@@ -28,6 +29,8 @@ pub struct RecoverJob<'a> {
     pub args: &'a RecoverArgs,
     pub inputs: &'a RecoveryInputs<'a>,
     pub source: SampleSource<'a>,
+    /// What the file is written with.
+    pub encoding: EncodingMemory,
 }
 
 impl RecoverJob<'_> {
@@ -44,16 +47,8 @@ impl RecoverJob<'_> {
         };
         // Before the long work, too.
         let check = |recovery: &PreparedRecovery| {
-            let (window, rank) = (
-                recovery.geometry().window,
-                recovery.basis().map(Basis::rank),
-            );
-            encoders(
-                self.source.plan,
-                self.inputs.levels,
-                window,
-                rank.unwrap_or(0),
-            )?;
+            let rank = recovery.basis().map_or(0, Basis::rank);
+            encoders(self.encoding, recovery.geometry(), self.inputs.levels, rank)?;
             match checkpoint.get() {
                 Some(checkpoint) => {
                     lock(checkpoint).set_fingerprint(recovery_fingerprint(recovery))
@@ -88,7 +83,7 @@ impl RecoverJob<'_> {
         let counts = recovery.run(photographs, tile_rows, checkpoint)?;
         let destination = Destination {
             output: &self.args.output,
-            plan: source.plan,
+            memory: self.encoding,
             cores: source.cores,
             too_large_remedy: TOO_LARGE_REMEDY,
         };

@@ -16,7 +16,7 @@ use crate::cli::levels_output::{temporary_spool, write_levels};
 use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, thread_pool};
 use crate::cli::progress;
-use crate::export::{self, FileQuality, MemoryPlan};
+use crate::export::{self, EncodingMemory, FileQuality};
 use crate::format::{EncodedFile, FormatError, Metadata, SpooledChunks};
 use crate::job_executor::Cancelled;
 use crate::pyramid::PyramidLayout;
@@ -33,7 +33,7 @@ pub type ReadTile<'a> = dyn Fn(usize) -> io::Result<Vec<u8>> + Sync + 'a;
 /// Where a file goes, and what it is written with.
 pub struct Destination<'a> {
     pub output: &'a Path,
-    pub plan: &'a MemoryPlan,
+    pub memory: EncodingMemory,
     pub cores: &'a InterruptibleCores,
     /// What to do after a `--max-bytes` that is too low.
     pub too_large_remedy: &'static str,
@@ -84,9 +84,9 @@ pub struct WrittenFile {
 impl LtmWriter<'_> {
     /// Encodes the tiles that `record` reads, and writes the file. An interruption is reported as [`Cancelled`].
     fn write(&self, metadata: &Metadata, record: &ReadTile<'_>) -> Result<WrittenFile> {
-        let window = self.job.recovery.geometry().window;
-        let rank = self.job.rank().unwrap_or(0);
-        let encoders = encoders(self.destination.plan, self.levels, window, rank)?;
+        let geometry = self.job.recovery.geometry();
+        let (memory, rank) = (self.destination.memory, self.job.rank().unwrap_or(0));
+        let encoders = encoders(memory, geometry, self.levels, rank)?;
         thread_pool(encoders)?.install(|| self.write_within_limit(metadata, record))
     }
 

@@ -28,7 +28,7 @@ pub use self::messages::{FaultyPhotographsError, StrictError, UnusableError};
 pub use self::report::RecoverReport;
 
 use self::capture_sample::SampleSource;
-use self::inputs::RecoveryInputs;
+use self::inputs::{RecoveryInputs, encoding_memory};
 use self::job::RecoverJob;
 use super::output_file::{LTM, OutputFile};
 use super::process_resources::{InterruptibleCores, thread_pool};
@@ -62,6 +62,7 @@ pub fn recover(
         args,
         inputs: &inputs,
         source: SampleSource { plan: &plan, cores },
+        encoding: encoding_memory(args.memory),
     };
     thread_pool(plan.tiles_at_once())?.install(|| job.run())
 }

@@ -18,7 +18,8 @@ const MAX_NOTES_BYTES: usize = 2048;
 /// The origin of a file; see docs/format.md. The same command writes the same.
 #[derive(Serialize, Deserialize)]
 pub struct FileOrigin {
-    /// SHA-256 of the lines that `sha256sum` writes of the manifest and the files that the recovery reads, sorted by their paths.
+    /// SHA-256 of the lines that `sha256sum` writes of the manifest and the files that the recovery reads, sorted by their paths;
+    /// of a capture that was ingested, of the files that it was made from.
     inputs_sha256: String,
     window: u32,
     camera: ManifestCamera,

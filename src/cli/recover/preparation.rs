@@ -32,8 +32,8 @@ const MIN_STEP: f64 = 0.1;
 const MIN_STEP_RATIO: f64 = 25.0;
 
 /// A recovery that is ready to run, with the photographs that it is prepared from.
-pub struct PreparedCapture<D> {
-    pub sample: CaptureSample<D>,
+pub struct PreparedCapture {
+    pub sample: CaptureSample,
     pub prepared: PreparedExport,
     pub findings: Findings,
 }
@@ -72,15 +72,15 @@ pub struct CapturePreparation<'a, S> {
 }
 
 /// The photographs, and the recovery that is prepared from them.
-pub struct Attempt<D> {
+pub struct Attempt {
     pub method: Method,
-    pub sample: CaptureSample<D>,
+    pub sample: CaptureSample,
     pub prepared: Result<PreparedExport, RecoverError>,
     /// Why it may be bad.
     pub cause: Option<Finding>,
 }
 
-impl<D> Attempt<D> {
+impl Attempt {
     fn snr(&self) -> Option<Decibels> {
         self.prepared.as_ref().ok()?.expected_snr()
     }
@@ -122,11 +122,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     /// # Errors
     /// If nothing can be recovered, if hardly anything would be right and `--force` is not given, and after a warning with
     /// `--strict`.
-    pub fn run(
-        &self,
-        sample: CaptureSample<S::Dark>,
-        options: &RecoveryOptions,
-    ) -> Result<PreparedCapture<S::Dark>> {
+    pub fn run(&self, sample: CaptureSample, options: &RecoveryOptions) -> Result<PreparedCapture> {
         let mut findings = Findings::printed();
         let Attempt {
             sample,
@@ -165,11 +161,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     ///
     /// # Errors
     /// If photographs cannot be read, and if the executor is cancelled.
-    pub fn examine(
-        &self,
-        sample: CaptureSample<S::Dark>,
-        findings: &mut Findings,
-    ) -> Result<Attempt<S::Dark>> {
+    pub fn examine(&self, sample: CaptureSample, findings: &mut Findings) -> Result<Attempt> {
         findings.add(messages::unknown_fields(self.folder));
         let sample = self.with_saturation(sample, findings)?;
         let (folder, shots, read) = (&sample.folder, &sample.shots, &sample.read);
@@ -203,9 +195,9 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     /// Leaves out samples that are saturated though this is not declared.
     fn with_saturation(
         &self,
-        sample: CaptureSample<S::Dark>,
+        sample: CaptureSample,
         findings: &mut Findings,
-    ) -> Result<CaptureSample<S::Dark>> {
+    ) -> Result<CaptureSample> {
         let codes = [Some(sample.read.codes), sample.read.flood_codes];
         let codes: Vec<CodeStatistics> = codes.into_iter().flatten().collect();
         let manifest = sample.folder.manifest();
@@ -219,11 +211,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
 
     /// Looks for a fault of the capture as a whole. If the camera moved once, only the photographs from one of its places
     /// are used.
-    fn with_capture_fault(
-        &self,
-        attempt: Attempt<S::Dark>,
-        findings: &mut Findings,
-    ) -> Result<Attempt<S::Dark>> {
+    fn with_capture_fault(&self, attempt: Attempt, findings: &mut Findings) -> Result<Attempt> {
         if !attempt.is_doubtful() {
             return Ok(attempt);
         }
@@ -269,11 +257,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
 
     /// Looks for responses of display and camera that explain the photographs better than those declared. Responses are
     /// tried in turn, as one is estimated with the mean function that follows from the one before.
-    fn with_response(
-        &self,
-        declared: Attempt<S::Dark>,
-        findings: &mut Findings,
-    ) -> Result<Attempt<S::Dark>> {
+    fn with_response(&self, declared: Attempt, findings: &mut Findings) -> Result<Attempt> {
         let is_usable = declared.prepared.is_ok() || declared.is_doubtful();
         if declared.cause.is_some() || !is_usable {
             return Ok(declared);
@@ -343,7 +327,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     }
 
     /// The manifest with another response, if one may explain the photographs better.
-    fn likely_manifest(&self, attempt: &Attempt<S::Dark>) -> Result<Option<Manifest>> {
+    fn likely_manifest(&self, attempt: &Attempt) -> Result<Option<Manifest>> {
         let (sample, cores) = (&attempt.sample, self.source.cores());
         let measurements = &sample.measurements;
         let white = flood_white(sample.folder.manifest());
@@ -368,11 +352,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     }
 
     /// Looks whether the display dims bright pictures, or highlights are compressed, as only the flood photograph may tell.
-    fn with_flood_shortfall(
-        &self,
-        attempt: Attempt<S::Dark>,
-        findings: &mut Findings,
-    ) -> Result<Attempt<S::Dark>> {
+    fn with_flood_shortfall(&self, attempt: Attempt, findings: &mut Findings) -> Result<Attempt> {
         let Some(prepared) = (attempt.prepared.as_ref().ok()).filter(|_| !attempt.is_doubtful())
         else {
             return Ok(attempt);
@@ -414,7 +394,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     }
 
     /// Prepares the recovery as declared: by the fallback where the method predicts too badly.
-    fn first_attempt(&self, sample: CaptureSample<S::Dark>) -> Attempt<S::Dark> {
+    fn first_attempt(&self, sample: CaptureSample) -> Attempt {
         let attempt = self.attempt(self.settings.method, sample);
         let is_implausible = attempt.snr().is_some_and(|snr| snr < MIN_PLAUSIBLE_SNR);
         match self.settings.fallback.filter(|_| is_implausible) {
@@ -424,7 +404,7 @@ impl<S: PhotographSource> CapturePreparation<'_, S> {
     }
 
     /// Chooses the window, and learns or chooses what the method needs.
-    fn attempt(&self, method: Method, sample: CaptureSample<S::Dark>) -> Attempt<S::Dark> {
+    fn attempt(&self, method: Method, sample: CaptureSample) -> Attempt {
         let _spinner = progress::spinner("learning");
         let cores = self.source.cores();
         let settings = ExportSettings {

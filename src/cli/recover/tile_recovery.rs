@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::capture_sample::{CaptureSample, SampleSource};
 use super::prepared_job::PreparedJob;
-use crate::capture::{CameraPixelSet, CaptureFolder, DarkFrame, DefectivePixels, Measurements};
+use crate::capture::{CameraPixelSet, CaptureFolder, DefectivePixels, Measurements};
 use crate::cli::measurement_reader::MeasurementReader;
 use crate::cli::progress;
 use crate::export;
@@ -67,7 +67,6 @@ pub struct TileRecovery<'a> {
 pub struct TilePhotographs {
     /// With the manifest that they are read by.
     folder: CaptureFolder,
-    dark: DarkFrame,
     measurements: Measurements,
     /// Defects of the photographs, if they are loaded whole.
     loaded_defects: Option<DefectivePixels>,
@@ -83,7 +82,6 @@ impl TilePhotographs {
         }
         Self {
             folder: sample.folder,
-            dark: sample.dark,
             measurements,
             loaded_defects: is_whole.then_some(sample.read.defects),
         }
@@ -92,11 +90,10 @@ impl TilePhotographs {
     /// Those of a capture whose recovery was prepared elsewhere.
     ///
     /// # Errors
-    /// If patterns or the dark frame cannot be read.
+    /// If patterns cannot be read.
     pub fn of_capture(capture: &CaptureFolder, job: &PreparedJob) -> Result<Self> {
         let folder = capture.with_manifest(job.manifest.clone());
         Ok(Self {
-            dark: folder.read_dark()?,
             measurements: job.empty_measurements(&folder)?,
             folder,
             loaded_defects: None,
@@ -117,7 +114,6 @@ impl TileRecovery<'_> {
     ) -> Result<TileCounts> {
         let TilePhotographs {
             folder,
-            dark,
             mut measurements,
             loaded_defects,
         } = photographs;
@@ -130,7 +126,10 @@ impl TileRecovery<'_> {
         bar.reset_eta(); // these tiles took no time
         let mut reader = match loaded_defects {
             Some(_) => None,
-            None => Some(MeasurementReader::open(&folder, &dark, &job.shots)?),
+            None => Some((
+                MeasurementReader::open(&folder, &job.shots)?,
+                folder.open_dark()?,
+            )),
         };
         let mut counts = TileCounts {
             defects: loaded_defects.unwrap_or_default(),
@@ -139,10 +138,10 @@ impl TileRecovery<'_> {
         let own_rows = [tile_rows.start, tile_rows.end].map(|row| row * geometry.tile_side);
         let mut next_row = 0;
         for (tile_rows, rows) in plan.strips(tile_rows, recovery.halo()) {
-            if let Some(reader) = &mut reader {
+            if let Some((reader, dark)) = &mut reader {
                 let check = || Ok(cores.check_cancelled()?);
                 let pixels = CameraPixelSet::row_range(rows.clone(), geometry.camera.width);
-                reader.load(&mut measurements, &pixels, check)?;
+                reader.load(&mut measurements, &dark.read(&pixels)?, &pixels, check)?;
                 // Rows that were loaded before are filled already, and those above and below the shard are counted by others.
                 let [start, end] = own_rows.map(|row| row.clamp(next_row, rows.end.max(next_row)));
                 reader.fill_defects(&mut measurements, next_row..start, codes);

@@ -1,6 +1,7 @@
 //! `ltm-export stage`: the stages of a recovery one by one, for several machines.
 //!
 //! ```text
+//! (PNGs ── ingest ── TIFFs)
 //! capture ── plan ── plan.json ── learn ── learned.bin ─┬─ tiles 1/n ── shards/1-of-n.pack ─┬─ assemble ── .ltm
 //!                                                       ├─ tiles 2/n ── shards/2-of-n.pack ─┤
 //!                                                       ⋮                                   ⋮
@@ -10,6 +11,7 @@
 //! inputs stays, any other is written under a temporary name and renamed. Each names what it follows from, so that files of
 //! another plan are told.
 
+mod ingest;
 mod learned_file;
 mod partial_shards;
 mod plan;
@@ -25,6 +27,7 @@ use clap::{Args, Subcommand};
 
 pub use self::stage_folder::StageFileError;
 
+use self::ingest::Ingestion;
 use self::learned_file::LearnedFile;
 use self::partial_shards::PartialShard;
 use self::plan::{Comparison, RecoveryPlan};
@@ -35,13 +38,13 @@ use super::output_file::{LTM, OutputFile};
 use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
 use super::recover::args::{DEFAULT_MEMORY, RecoveryOptions};
 use super::recover::capture_sample::SampleSource;
-use super::recover::inputs::RecoveryInputs;
+use super::recover::inputs::{RecoveryInputs, encoding_memory};
 use super::recover::ltm_writer::{Destination, finish};
 use super::recover::prepared_job::PreparedJob;
 use super::recover::tile_recovery::{TilePhotographs, TileRecovery};
 use super::report::{print_json, print_line};
 use super::value_parsers::ByteCount;
-use crate::capture::CaptureFolder;
+use crate::capture::{CaptureFolder, MANIFEST_NAME};
 use crate::job_executor::Cancelled;
 
 /// What to do after a `--max-bytes` that is too low.
@@ -57,10 +60,24 @@ pub struct StageArgs {
 
 #[derive(Debug, Subcommand)]
 enum Stage {
+    Ingest(IngestArgs),
     Plan(PlanArgs),
     Learn(LearnArgs),
     Tiles(TilesArgs),
     Assemble(AssembleArgs),
+}
+
+/// Copy a capture with photographs as TIFFs, of which stages read only the rows they need
+#[derive(Debug, Args)]
+struct IngestArgs {
+    /// Capture folder: capture.json and the files it names
+    capture: PathBuf,
+    /// Folder of the copy; created if missing
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    /// Which of how many parts of the files: 1/16 to 16/16. The last that ends writes capture.json
+    #[arg(long, value_name = "I/N", default_value = "1/1", value_parser = Shard::parse)]
+    shard: Shard,
 }
 
 /// Write plan.json: the options of a recovery, and what identifies its photographs
@@ -132,6 +149,7 @@ pub fn run(args: &StageArgs) -> Result<()> {
     }
     let cores = InterruptibleCores::listen()?;
     let result = match &args.stage {
+        Stage::Ingest(args) => ingest(args, &cores),
         Stage::Plan(args) => plan(args, &cores),
         Stage::Learn(args) => learn(args, &cores),
         Stage::Tiles(args) => tiles(args, &cores),
@@ -176,6 +194,19 @@ impl Folders {
             capture,
         })
     }
+}
+
+fn ingest(args: &IngestArgs, cores: &InterruptibleCores) -> Result<()> {
+    let capture = CaptureFolder::open(&args.capture)?;
+    let counts = Ingestion::new(&capture, &args.output)?.run(args.shard, cores)?;
+    let (path, written, complete) = (args.output.display(), counts.written, counts.complete);
+    let state = match counts.missing {
+        0 => format!("{MANIFEST_NAME} is written"),
+        missing => format!("other shards have {missing} to write before {MANIFEST_NAME}"),
+    };
+    print_line(&format!(
+        "{path}: {written} files written, {complete} were complete; {state}"
+    ))
 }
 
 fn plan(args: &PlanArgs, cores: &InterruptibleCores) -> Result<()> {
@@ -225,7 +256,7 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
         stages,
         plan,
         capture,
-    } = args.folders.open(Comparison::Lengths, cores)?;
+    } = args.folders.open(Comparison::Records, cores)?;
     // Copies of folders may lack empty ones.
     StageFolder::create(&args.folders.folder)?;
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
@@ -238,7 +269,8 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
         sink.remove()?;
         return print_complete();
     }
-    let memory = inputs.memory_plan(args.memory)?;
+    let window = job.recovery.geometry().window;
+    let memory = inputs.tiles_memory_plan(args.memory, window)?;
     sink.print_count();
     let source = SampleSource {
         plan: &memory,
@@ -286,11 +318,10 @@ fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
     let LearnedFile { id, mut job } = LearnedFile::read(&stages, &plan, &inputs)?;
     job.findings.print_further();
-    let memory = inputs.memory_plan(args.memory)?;
     let packs = ShardPacks::open(&stages, &id, job.recovery.geometry(), args.shards)?;
     let destination = Destination {
         output: &args.output,
-        plan: &memory,
+        memory: encoding_memory(args.memory),
         cores,
         too_large_remedy: TOO_LARGE_REMEDY,
     };

@@ -24,8 +24,8 @@ const PLAN: FileSignature = FileSignature::of_own_name("a plan");
 /// How a capture is compared with the one that was planned.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Comparison {
-    /// Its manifest, and the lengths of its other files.
-    Lengths,
+    /// Its manifest, the records of photographs that were ingested, and the lengths of its other files.
+    Records,
     /// All files whole.
     Contents,
 }
@@ -130,9 +130,14 @@ impl RecoveryPlan {
             cores.check_cancelled()?;
             let path = capture.root().join(name);
             let is_compared_whole = name == MANIFEST_NAME || comparison == Comparison::Contents;
-            let is_same = match is_compared_whole {
-                true => FileDigest::of(&path)? == *planned,
-                false => {
+            let record = match is_compared_whole {
+                true => None,
+                false => FileDigest::of_record(&path)?,
+            };
+            let is_same = match (is_compared_whole, record) {
+                (true, _) => FileDigest::of(&path)? == *planned,
+                (_, Some(record)) => record == *planned,
+                (false, None) => {
                     let file = path.metadata();
                     let file = file.map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)));
                     file?.len() == planned.bytes

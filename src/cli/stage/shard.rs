@@ -42,6 +42,12 @@ impl Shard {
         (1..=count).map(move |number| Self { number, count })
     }
 
+    /// Those of some items that this shard has: every n-th.
+    pub fn share<T>(self, items: impl Iterator<Item = T>) -> impl Iterator<Item = T> {
+        let (number, count) = (self.number as usize, self.count as usize);
+        items.skip(number - 1).step_by(count)
+    }
+
     /// `3-of-16`.
     pub fn file_stem(self) -> String {
         format!("{}-of-{}", self.number, self.count)

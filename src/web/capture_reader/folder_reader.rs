@@ -3,7 +3,7 @@
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::page_files::PageFiles;
-use crate::capture::{CameraRowSet, CaptureFolder, DarkFrame};
+use crate::capture::{CameraPixelSet, CameraRowSet, CaptureFolder, DarkFrame};
 use crate::export::{Provenance, select_shots};
 use crate::web::CodedError;
 use crate::web::recovery_error::out_of_memory;
@@ -23,7 +23,7 @@ impl CaptureReader {
     /// Codes that begin with `capture-`.
     pub fn open(files: PageFiles) -> Result<Self, CodedError> {
         let folder = CaptureFolder::from_files(files)?;
-        let dark = folder.read_dark()?;
+        let dark = folder.read_dark(&CameraPixelSet::all(folder.manifest().camera.extent()))?;
         Ok(Self { folder, dark })
     }
 
@@ -50,7 +50,7 @@ impl CaptureReader {
         let (folder, dark) = (&self.folder, &self.dark);
         let manifest = folder.manifest();
         let shots = select_shots(&manifest.shots, count)?;
-        folder.open_flood(dark)?;
+        folder.open_flood()?;
         let correspondence = match &manifest.correspondence {
             Some(correspondence) if correspondence.displacement.is_some() => {
                 let message = "capture.json: the correspondence bends, and pages recover with affine ones only; recover this \
@@ -78,7 +78,7 @@ impl CaptureReader {
     /// Codes that begin with `capture-`; `internal` if there is no such shot.
     pub fn photograph(&self, i: usize) -> Result<Vec<f32>, CodedError> {
         self.check_shot(i)?;
-        let (photo, _) = self.folder.open_shot(i, &self.dark)?.read_all()?;
+        let (photo, _) = self.folder.open_shot(i)?.read_all(&self.dark)?;
         Ok(photo.into_flattened())
     }
 

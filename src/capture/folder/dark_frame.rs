@@ -1,0 +1,94 @@
+//! The photograph under no light.
+
+use std::ops::Range;
+
+use super::disk_files::DiskFiles;
+use super::files::CaptureFiles;
+use super::photograph_codes::PhotographCodes;
+use super::photograph_row_reader::read_rows;
+use crate::capture::camera_pixel_set::CameraPixelSet;
+use crate::capture::error::CaptureError;
+use crate::capture::manifest::ManifestCamera;
+use crate::capture::measurements::LinearPhoto;
+use crate::capture::noise_model::NoiseModel;
+use crate::transport::{CHANNELS, CameraPixel};
+
+/// The photograph under no light in some camera pixels, where it is subtracted from all others.
+#[derive(Clone, Debug)]
+pub struct DarkFrame {
+    pixels: CameraPixelSet,
+    /// Number of these pixels above the first row of `light`.
+    above: usize,
+    /// In units of the measurement.
+    light: LinearPhoto,
+    /// The measurement of one code.
+    code: f64,
+}
+
+impl DarkFrame {
+    /// The columns `span` of row `y`, which are among its pixels.
+    pub(super) fn span(&self, y: u32, span: &Range<u32>) -> &[[f32; CHANNELS]] {
+        let pixel = CameraPixel { x: span.start, y };
+        let first = self.pixels.index_of(pixel).unwrap_or_default();
+        &self.light[first - self.above..][..span.len()]
+    }
+
+    /// The noise floor estimated from its pixels, none of which were skipped; of rounding alone without a dark frame.
+    pub fn noise(&self) -> NoiseModel {
+        NoiseModel::from_dark_rows(&self.pixels.split(&self.light), self.code)
+    }
+}
+
+/// Reads the rows of the dark frame once, from the top down.
+pub struct DarkFrameReader<'a, F: CaptureFiles = DiskFiles> {
+    pub(super) camera: &'a ManifestCamera,
+    /// `None` if the capture has no dark frame: it is black.
+    pub(super) codes: Option<PhotographCodes<'a, F>>,
+    pub(super) next_row: u32,
+}
+
+impl<F: CaptureFiles> DarkFrameReader<'_, F> {
+    /// Reads those of `pixels` whose rows were not read before.
+    ///
+    /// # Errors
+    /// If the file is damaged or ends early.
+    pub fn read(&mut self, pixels: &CameraPixelSet) -> Result<DarkFrame, CaptureError> {
+        let camera = self.camera;
+        let above = pixels.count_above(self.next_row);
+        let count = pixels.count() - above;
+        let mut light = Vec::with_capacity(count);
+        if let Some(codes) = &mut self.codes {
+            let linear = |codes: &[u16; CHANNELS]| codes.map(|code| camera.linear(code, 1.0));
+            let end = pixels.rows().end();
+            read_rows(codes, &mut self.next_row, end, pixels, |y, row| {
+                for span in pixels.spans_of(y) {
+                    let codes = &row[span.start as usize..span.end as usize];
+                    light.extend(codes.iter().map(linear));
+                }
+            })?;
+        } else {
+            light.resize(count, [0.0; CHANNELS]);
+            self.next_row = self.next_row.max(pixels.rows().end());
+        }
+        Ok(DarkFrame {
+            pixels: pixels.clone(),
+            above,
+            light,
+            code: 1.0 / (camera.white - camera.black),
+        })
+    }
+
+    /// Checks the rest of the file.
+    ///
+    /// # Errors
+    /// If it is damaged or ends early.
+    pub fn finish(mut self) -> Result<(), CaptureError> {
+        if let Some(mut codes) = self.codes {
+            let none = CameraPixelSet::row_range(0..0, self.camera.width);
+            let end = self.camera.height;
+            read_rows(&mut codes, &mut self.next_row, end, &none, |_, _| {})?;
+            codes.finish([u32::MAX; CHANNELS])?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,90 @@
+//! The codes of a photograph, row by row, whatever the format of its file.
+
+#[cfg(not(target_arch = "wasm32"))]
+use std::io::Read;
+
+use super::files::CaptureFiles;
+use super::picture_file::PictureFile;
+use super::picture_png::PngRowReader;
+#[cfg(not(target_arch = "wasm32"))]
+use super::picture_tiff::{self, TiffRowReader};
+use crate::capture::code_statistics::CodeStatistics;
+use crate::capture::error::CaptureError;
+use crate::transport::{CHANNELS, Extent};
+
+/// A 16-bit RGB photograph that is read row by row from the top. Pages read PNG only.
+pub(super) enum PhotographCodes<'a, F: CaptureFiles> {
+    Png(Box<PngRowReader<'a, F>>),
+    #[cfg(not(target_arch = "wasm32"))]
+    Tiff(Box<TiffRowReader<'a, F>>),
+}
+
+impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
+    /// Opens a photograph by the format that its first bytes say.
+    pub fn open(file: PictureFile<'a, F>) -> Result<Self, CaptureError> {
+        #[cfg(not(target_arch = "wasm32"))]
+        return Self::open_within(file, picture_tiff::MAX_STRIP_BYTES);
+        #[cfg(target_arch = "wasm32")]
+        Ok(Self::Png(Box::new(PngRowReader::open(file)?)))
+    }
+
+    /// The same, with strips of a TIFF that take `max_bytes` at most.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn open_within(file: PictureFile<'a, F>, max_bytes: usize) -> Result<Self, CaptureError> {
+        let mut start = Vec::new();
+        let read = file.open()?.take(4).read_to_end(&mut start);
+        read.map_err(|e| file.io_error(e))?;
+        Ok(match picture_tiff::is_tiff(&start) {
+            true => Self::Tiff(Box::new(TiffRowReader::open_within(file, max_bytes)?)),
+            false => Self::Png(Box::new(PngRowReader::open(file)?)),
+        })
+    }
+
+    pub fn extent(&self) -> Extent {
+        match self {
+            Self::Png(reader) => reader.extent(),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Tiff(reader) => reader.extent(),
+        }
+    }
+
+    /// The codes of the next row; `None` after the last.
+    pub fn next(&mut self) -> Result<Option<&[[u16; CHANNELS]]>, CaptureError> {
+        match self {
+            Self::Png(reader) => reader.next(),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Tiff(reader) => reader.next(),
+        }
+    }
+
+    /// Makes row `y`, which must not lie above, the next one without reading those between. False if the file has to be read
+    /// whole, as nothing else says the statistics of its codes.
+    pub fn skip_to(&mut self, y: u32) -> bool {
+        match self {
+            Self::Png(_) => false,
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Tiff(reader) => reader.skip_to(y),
+        }
+    }
+
+    /// Frees what is in memory of rows that were read.
+    pub fn release(&mut self) {
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Self::Tiff(reader) = self {
+            reader.release();
+        }
+    }
+
+    /// The statistics that the file says of its own codes, if codes from `saturated_from` on are saturated. Otherwise checks
+    /// the rest of the file, once all rows are read.
+    pub fn finish(
+        self,
+        saturated_from: [u32; CHANNELS],
+    ) -> Result<Option<CodeStatistics>, CaptureError> {
+        match self {
+            Self::Png(reader) => reader.finish().map(|()| None),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Tiff(reader) => reader.statistics(saturated_from),
+        }
+    }
+}

@@ -1,0 +1,520 @@
+//! TIFF photographs: 16-bit linear RGB, in strips. With the record of [`IngestRecord`], rows are read without the others.
+
+use std::io::{BufReader, Seek, Write};
+
+use tiff::decoder::{ChunkType, Decoder, Limits};
+use tiff::encoder::colortype::RGB16;
+use tiff::encoder::{TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard};
+use tiff::tags::{PlanarConfiguration, SampleFormat, Tag};
+use tiff::{ColorType, TiffError, TiffResult};
+
+use super::files::{CaptureFile, CaptureFiles};
+use super::ingest::IngestError;
+use super::ingest_record::{CodeHistogram, IngestRecord, IngestSource};
+use super::photograph_codes::PhotographCodes;
+use super::picture_file::PictureFile;
+use crate::capture::code_statistics::CodeStatistics;
+use crate::capture::error::{CaptureError, CaptureErrorKind};
+use crate::transport::{CHANNELS, Extent};
+
+/// The first bytes of a TIFF; BigTIFF has 43 (+) instead of 42 (*).
+const SIGNATURES: [&[u8]; 4] = [b"II*\0", b"II+\0", b"MM\0*", b"MM\0+"];
+/// Bytes read at a time for a tag; strips are read whole.
+pub(super) const TAG_BYTES: usize = 1 << 10;
+/// Rows of a strip that this program writes.
+const STRIP_ROWS: u32 = 16;
+/// Largest strip that is read: as many are in memory as photographs are read at once.
+pub(super) const MAX_STRIP_BYTES: usize = 8 << 20;
+/// Largest strip that is read to write smaller ones.
+const MAX_INGESTED_STRIP_BYTES: usize = 2 << 30;
+/// Bytes of samples from which on offsets do not fit in 32 bits, with space for the rest of the file.
+const BIG_TIFF_BYTES: u64 = 0xF000_0000;
+
+/// Whether a file that begins with these bytes is a TIFF.
+pub(super) fn is_tiff(start: &[u8]) -> bool {
+    SIGNATURES.contains(&start)
+}
+
+/// The first picture of a TIFF, row by row from the top.
+pub(super) struct TiffRowReader<'a, F: CaptureFiles> {
+    file: PictureFile<'a, F>,
+    decoder: Decoder<BufReader<CaptureFile<'a, F>>>,
+    extent: Extent,
+    strip_rows: u32,
+    record: Option<IngestRecord>,
+    /// The strip that was read last, until it is released.
+    strip: Option<(u32, Vec<[u16; CHANNELS]>)>,
+    next_row: u32,
+}
+
+impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
+    /// Opens a TIFF whose strips take `max_bytes` at most.
+    pub fn open_within(file: PictureFile<'a, F>, max_bytes: usize) -> Result<Self, CaptureError> {
+        let source = BufReader::with_capacity(TAG_BYTES, file.open()?);
+        let mut decoder = Decoder::new(source).map_err(|e| unreadable(&file, e))?;
+        let mut limits = Limits::default();
+        limits.decoding_buffer_size = max_bytes;
+        limits.intermediate_buffer_size = max_bytes;
+        decoder = decoder.with_limits(limits);
+        let layout = Layout::read(&mut decoder).map_err(|e| unreadable(&file, e))?;
+        file.check_extent(layout.extent)?;
+        if layout.extent.area() == 0 {
+            let reason = "it has no pixels".to_owned();
+            return Err(file.error(CaptureErrorKind::Unreadable("TIFF", reason)));
+        }
+        layout.check(max_bytes).map_err(|e| file.error(e))?;
+        let record = IngestRecord::read(&mut decoder).map_err(|e| unreadable(&file, e))?;
+        Ok(Self {
+            extent: layout.extent,
+            strip_rows: layout.strip_rows,
+            record,
+            strip: None,
+            next_row: 0,
+            decoder,
+            file,
+        })
+    }
+
+    pub fn extent(&self) -> Extent {
+        self.extent
+    }
+
+    /// The codes of the next row; `None` after the last.
+    pub fn next(&mut self) -> Result<Option<&[[u16; CHANNELS]]>, CaptureError> {
+        if self.next_row >= self.extent.height {
+            return Ok(None);
+        }
+        let (i, row) = (
+            self.next_row / self.strip_rows,
+            self.next_row % self.strip_rows,
+        );
+        if self.strip.as_ref().is_none_or(|(read, _)| *read != i) {
+            self.read_strip(i)?;
+        }
+        self.next_row += 1;
+        let width = self.extent.width as usize;
+        let strip = self
+            .strip
+            .iter()
+            .flat_map(|(_, strip)| strip.chunks_exact(width));
+        Ok({ strip }.nth(row as usize))
+    }
+
+    fn read_strip(&mut self, i: u32) -> Result<(), CaptureError> {
+        // Strips have equal sizes, so the memory of the last is enough.
+        let mut strip = self.strip.take().map_or(Vec::new(), |(_, strip)| strip);
+        let first = i * self.strip_rows;
+        let rows = self.strip_rows.min(self.extent.height - first);
+        strip.resize(Extent::new(self.extent.width, rows).area(), [0; CHANNELS]);
+        let samples = bytemuck::cast_slice_mut(&mut strip);
+        let read = self.decoder.read_chunk_bytes(i, samples);
+        read.map_err(|e| unreadable(&self.file, e))?;
+        if let Some(record) = &self.record {
+            let checksum = crc32c::crc32c(samples);
+            if record.checksums.get(i as usize) != Some(&checksum) {
+                let last = first + rows - 1;
+                let reason = format!("the checksum of rows {first} to {last} is wrong");
+                return Err(self.unreadable(&reason));
+            }
+        }
+        self.strip = Some((i, strip));
+        Ok(())
+    }
+
+    /// See [`PhotographCodes::skip_to`].
+    pub fn skip_to(&mut self, y: u32) -> bool {
+        if self.record.is_some() {
+            self.next_row = y;
+        }
+        self.record.is_some()
+    }
+
+    pub fn release(&mut self) {
+        self.strip = None;
+    }
+
+    /// The statistics by the record, if there is one.
+    pub fn statistics(
+        mut self,
+        saturated_from: [u32; CHANNELS],
+    ) -> Result<Option<CodeStatistics>, CaptureError> {
+        let Some(record) = &self.record else {
+            return Ok(None);
+        };
+        let statistics = record.statistics(&mut self.decoder, saturated_from);
+        statistics.map(Some).map_err(|e| unreadable(&self.file, e))
+    }
+
+    fn unreadable(&self, reason: &str) -> CaptureError {
+        let problem = CaptureErrorKind::Unreadable("TIFF", reason.to_owned());
+        self.file.error(problem)
+    }
+}
+
+/// How the samples of a TIFF are arranged.
+struct Layout {
+    extent: Extent,
+    color: ColorType,
+    is_integer: bool,
+    is_tiled: bool,
+    is_planar: bool,
+    strip_rows: u32,
+}
+
+impl Layout {
+    fn read<F: CaptureFiles>(
+        decoder: &mut Decoder<BufReader<CaptureFile<'_, F>>>,
+    ) -> TiffResult<Self> {
+        let (width, height) = decoder.dimensions()?;
+        let formats: Option<Vec<u16>> = decoder.find_tag_unsigned_vec(Tag::SampleFormat)?;
+        let planes: Option<u16> = decoder.find_tag_unsigned(Tag::PlanarConfiguration)?;
+        Ok(Self {
+            extent: Extent::new(width, height),
+            color: decoder.colortype()?,
+            is_integer: { formats.iter().flatten() }
+                .all(|format| *format == SampleFormat::Uint.to_u16()),
+            is_tiled: decoder.get_chunk_type() == ChunkType::Tile,
+            is_planar: planes == Some(PlanarConfiguration::Planar.to_u16()),
+            strip_rows: decoder.chunk_dimensions().1.min(height).max(1),
+        })
+    }
+
+    fn check(&self, max_strip_bytes: usize) -> Result<(), CaptureErrorKind> {
+        if self.color != ColorType::RGB(16) || !self.is_integer {
+            let numbers = if self.is_integer {
+                ""
+            } else {
+                " floating-point"
+            };
+            let bits = self.color.bit_depth();
+            let color = match self.color {
+                ColorType::Gray(_) => "grey",
+                ColorType::GrayA(_) => "grey with alpha",
+                ColorType::RGB(_) => "RGB",
+                ColorType::RGBA(_) => "RGB with alpha",
+                ColorType::Palette(_) => "with a palette",
+                _ => "of another colour type",
+            };
+            let found = format!("{bits}-bit{numbers} {color}");
+            return Err(CaptureErrorKind::PhotoType(found));
+        }
+        if self.is_tiled {
+            return Err(CaptureErrorKind::NotInStrips("is tiled"));
+        }
+        if self.is_planar {
+            return Err(CaptureErrorKind::NotInStrips("has planes of one channel"));
+        }
+        let row_bytes = size_of::<[u16; CHANNELS]>() as u64 * u64::from(self.extent.width);
+        match row_bytes.saturating_mul(self.strip_rows.into()) <= max_strip_bytes as u64 {
+            true => Ok(()),
+            false => Err(CaptureErrorKind::LargeStrips(self.strip_rows)),
+        }
+    }
+}
+
+fn unreadable<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> CaptureError {
+    file.error(match error {
+        // The disk or the network is at fault, not the file.
+        TiffError::IoError(e) if e.raw_os_error().is_some() => CaptureErrorKind::Io(e),
+        error => {
+            let reason = error.to_string().trim_end_matches('.').to_owned();
+            CaptureErrorKind::Unreadable("TIFF", reason)
+        }
+    })
+}
+
+/// Writes a photograph, whose file is `source`, as an uncompressed TIFF of strips with their record.
+pub(super) fn write<F: CaptureFiles>(
+    photograph: PictureFile<'_, F>,
+    source: &IngestSource,
+    out: impl Write + Seek,
+) -> Result<(), IngestError> {
+    let photograph = PhotographCodes::open_within(photograph, MAX_INGESTED_STRIP_BYTES)?;
+    let extent = photograph.extent();
+    let bytes = size_of::<[u16; CHANNELS]>() as u64 * extent.area() as u64;
+    match bytes < BIG_TIFF_BYTES {
+        true => write_kind::<F, _, TiffKindStandard>(photograph, source, out),
+        false => write_kind::<F, _, TiffKindBig>(photograph, source, out),
+    }
+}
+
+fn write_kind<F: CaptureFiles, W: Write + Seek, K: TiffKind>(
+    mut photograph: PhotographCodes<'_, F>,
+    source: &IngestSource,
+    out: W,
+) -> Result<(), IngestError> {
+    let Extent { width, height } = photograph.extent();
+    let mut encoder = TiffEncoder::<W, K>::new_generic(out)?;
+    let mut image = encoder.new_image::<RGB16>(width, height)?;
+    image.rows_per_strip(STRIP_ROWS.min(height))?;
+    let (mut checksums, mut histogram) = (Vec::new(), CodeHistogram::empty());
+    let mut strip: Vec<[u16; CHANNELS]> = Vec::new();
+    for y in 0..height {
+        if let Some(row) = photograph.next()? {
+            strip.extend_from_slice(row);
+        }
+        if (y + 1) % STRIP_ROWS == 0 || y + 1 == height {
+            let samples = strip.as_flattened();
+            image.write_strip(samples)?;
+            checksums.push(crc32c::crc32c(bytemuck::cast_slice(samples)));
+            histogram.add(&strip);
+            strip.clear();
+        }
+    }
+    photograph.finish([u32::MAX; CHANNELS])?;
+    IngestRecord::write(image.encoder(), source, checksums, &histogram)?;
+    Ok(image.finish()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+    use std::collections::BTreeMap;
+    use std::io::{self, Cursor};
+    use std::path::PathBuf;
+
+    use tiff::encoder::colortype::{ColorType, Gray16, RGB8, RGB32Float, RGBA16};
+    use tiff::encoder::{Compression, TiffValue};
+
+    use super::*;
+    use crate::capture::camera_pixel_set::CameraPixelSet;
+    use crate::capture::camera_row_set::CameraRowSet;
+    use crate::capture::{CaptureFolder, Manifest};
+
+    const WIDTH: u32 = 20;
+    const HEIGHT: u32 = 300;
+    /// Where strips begin: after the header and the resolution.
+    const STRIPS_START: usize = 24;
+
+    /// Files in memory that count the bytes that are read.
+    #[derive(Clone, Default)]
+    struct CountedFiles {
+        files: BTreeMap<String, Vec<u8>>,
+        bytes: Cell<usize>,
+    }
+
+    impl CaptureFiles for CountedFiles {
+        fn size(&self, name: &str) -> io::Result<u64> {
+            let file = self.files.get(name).ok_or(io::ErrorKind::NotFound)?;
+            Ok(file.len() as u64)
+        }
+
+        fn read(&self, name: &str, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+            let file = self.files.get(name).ok_or(io::ErrorKind::NotFound)?;
+            let rest = file.get(offset as usize..).unwrap_or_default();
+            let count = rest.len().min(buffer.len());
+            buffer[..count].copy_from_slice(&rest[..count]);
+            self.bytes.set(self.bytes.get() + count);
+            Ok(count)
+        }
+
+        fn path(&self, name: &str) -> PathBuf {
+            name.into()
+        }
+    }
+
+    fn codes() -> Vec<u16> {
+        let code = |i: u32| (i.wrapping_mul(2_654_435_761) >> 17) as u16;
+        (0..WIDTH * HEIGHT * 3).map(code).collect()
+    }
+
+    fn tiff<C: ColorType>(
+        samples: &[C::Inner],
+        strip_rows: u32,
+        compression: Compression,
+    ) -> Vec<u8>
+    where
+        [C::Inner]: TiffValue,
+    {
+        let mut file = Cursor::new(Vec::new());
+        let encoder = TiffEncoder::new(&mut file).unwrap();
+        let mut encoder = encoder.with_compression(compression);
+        let mut image = encoder.new_image::<C>(WIDTH, HEIGHT).unwrap();
+        image.rows_per_strip(strip_rows).unwrap();
+        image.write_data(samples).unwrap();
+        file.into_inner()
+    }
+
+    /// A capture whose dark frame is the photograph `name` with these bytes.
+    fn capture(name: &str, bytes: Vec<u8>) -> CaptureFolder<CountedFiles> {
+        let mut manifest = Manifest {
+            version: 1,
+            dark: Some(name.to_owned()),
+            shots: vec![Default::default()],
+            ..Manifest::default()
+        };
+        (manifest.camera.width, manifest.camera.height) = (WIDTH, HEIGHT);
+        (manifest.light.width, manifest.light.height) = (1, 1);
+        (manifest.light.gamma, manifest.camera.white) = (Some(1.0), 30_000.0);
+        manifest.shots[0].photo = name.to_owned();
+        let json = serde_json::to_vec(&manifest).unwrap();
+        let files = BTreeMap::from([("capture.json".to_owned(), json), (name.to_owned(), bytes)]);
+        CaptureFolder::from_files(CountedFiles {
+            files,
+            ..CountedFiles::default()
+        })
+        .unwrap()
+    }
+
+    fn source() -> IngestSource {
+        IngestSource {
+            name: "a.png".to_owned(),
+            bytes: 9,
+            sha256: "00".to_owned(),
+        }
+    }
+
+    fn ingested(capture: &CaptureFolder<CountedFiles>) -> Vec<u8> {
+        let mut out = Cursor::new(Vec::new());
+        let listed = capture.manifest().photographs()[0];
+        capture.ingest(listed, &source(), &mut out).unwrap();
+        out.into_inner()
+    }
+
+    /// As bits: saturated samples are NaN.
+    fn bits(photo: &[[f32; CHANNELS]]) -> Vec<[u32; CHANNELS]> {
+        photo.iter().map(|pixel| pixel.map(f32::to_bits)).collect()
+    }
+
+    fn read_all(capture: &CaptureFolder<CountedFiles>) -> (Vec<[u32; CHANNELS]>, CodeStatistics) {
+        let dark = capture.read_dark(&CameraPixelSet::row_range(0..HEIGHT, WIDTH));
+        let shot = capture.open_shot(0).unwrap();
+        let (photo, statistics) = shot.read_all(&dark.unwrap()).unwrap();
+        (bits(&photo), statistics)
+    }
+
+    #[test]
+    fn tiffs_of_all_strips_and_compressions_have_the_same_codes() {
+        let codes = codes();
+        let expected = read_all(&capture(
+            "a.tif",
+            tiff::<RGB16>(&codes, 1, Compression::Uncompressed),
+        ));
+        assert!(expected.1.saturated > 0);
+        for compression in [
+            Compression::Uncompressed,
+            Compression::Lzw,
+            Compression::Deflate(Default::default()),
+            Compression::Packbits,
+        ] {
+            for strip_rows in [7, 16, HEIGHT] {
+                let capture = capture("a.tif", tiff::<RGB16>(&codes, strip_rows, compression));
+                assert!(read_all(&capture) == expected, "{strip_rows} rows");
+                let again = self::capture("a.tif", ingested(&capture));
+                assert!(read_all(&again) == expected);
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_an_ingested_photograph_are_read_without_the_others() {
+        let whole = capture(
+            "a.tif",
+            tiff::<RGB16>(&codes(), 50, Compression::Uncompressed),
+        );
+        let (expected, statistics) = read_all(&whole);
+        let ingested = capture("a.tif", ingested(&whole));
+        let strips = [3..20, 100..130, 290..300];
+        let rows = CameraRowSet::from_strips(strips);
+        let pixels = CameraPixelSet::of_rows(rows.clone(), WIDTH);
+        let read = |capture: &CaptureFolder<CountedFiles>| {
+            let dark = capture.read_dark(&pixels).unwrap();
+            let before = capture.files.bytes.get();
+            let (mut reader, mut photo) = (capture.open_shot(0).unwrap(), Vec::new());
+            for end in [25, 115, HEIGHT] {
+                let above = rows.iter().filter(|y| *y < end).map(|y| y..y + 1);
+                let part = CameraPixelSet::of_rows(CameraRowSet::from_strips(above), WIDTH);
+                reader.read(&part, &dark, &mut photo).unwrap();
+            }
+            let statistics = reader.finish().unwrap();
+            (photo, statistics, capture.files.bytes.get() - before)
+        };
+        let (photo, found, bytes) = read(&ingested);
+        let width = WIDTH as usize;
+        let own = rows
+            .iter()
+            .flat_map(|y| &expected[y as usize * width..][..width]);
+        let own: Vec<_> = own.copied().collect();
+        assert_eq!(bits(&photo), own);
+        assert_eq!(found, statistics);
+        // Strips of 16 rows: 0 to 31, 96 to 143 with 112 to 127 twice, 288 to 299; and the record.
+        let record = ingested.files.files["a.tif"].len() - codes().len() * 2;
+        let strips = (32 + 64 + 12) * width * 6;
+        assert!(
+            (strips..strips + record + (8 << 10)).contains(&bytes),
+            "{bytes}"
+        );
+        let (photo, found, bytes) = read(&whole);
+        assert_eq!((bits(&photo), found), (own, statistics));
+        assert!(bytes > codes().len() * 2);
+    }
+
+    #[test]
+    fn damage_is_told_by_its_rows() {
+        let whole = ingested(&capture(
+            "a.tif",
+            tiff::<RGB16>(&codes(), 50, Compression::Uncompressed),
+        ));
+        let fault = |bytes: Vec<u8>| {
+            let capture = capture("a.tif", bytes);
+            let dark = capture.read_dark(&CameraPixelSet::row_range(16..32, WIDTH));
+            dark.map(drop).map_err(|e| e.to_string())
+        };
+        let damaged = |at: usize| {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1;
+            fault(bytes)
+        };
+        let row_bytes = WIDTH as usize * 6;
+        assert_eq!(damaged(STRIPS_START + 15 * row_bytes), Ok(()));
+        let said = damaged(STRIPS_START + 16 * row_bytes).unwrap_err();
+        assert!(
+            said.contains("the checksum of rows 16 to 31 is wrong"),
+            "{said}"
+        );
+        let said = fault(whole[..whole.len() / 2].to_vec()).unwrap_err();
+        assert!(said.contains("is not a readable TIFF"), "{said}");
+        // The text that names the source.
+        let at = whole
+            .windows(5)
+            .position(|bytes| bytes == b"a.png")
+            .unwrap();
+        let said = damaged(at).unwrap_err();
+        assert!(
+            said.contains("its record of ltm-export is damaged"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn other_types_of_samples_are_named() {
+        let (area, none) = ((WIDTH * HEIGHT) as usize, Compression::Uncompressed);
+        for (bytes, expected) in [
+            (tiff::<RGB8>(&vec![0; 3 * area], 16, none), "8-bit RGB"),
+            (tiff::<Gray16>(&vec![0; area], 16, none), "16-bit grey"),
+            (
+                tiff::<RGBA16>(&vec![0; 4 * area], 16, none),
+                "16-bit RGB with alpha",
+            ),
+            (
+                tiff::<RGB32Float>(&vec![0.0; 3 * area], 16, none),
+                "32-bit floating-point RGB",
+            ),
+        ] {
+            let error = capture("a.tif", bytes).open_shot(0).map(drop).unwrap_err();
+            assert!(
+                matches!(&error.problem, CaptureErrorKind::PhotoType(found) if found == expected)
+            );
+        }
+        let large = Layout {
+            extent: Extent::new(60_000, 60_000),
+            color: tiff::ColorType::RGB(16),
+            is_integer: true,
+            is_tiled: false,
+            is_planar: false,
+            strip_rows: 60_000,
+        };
+        let error = large.check(MAX_STRIP_BYTES).unwrap_err();
+        assert!(matches!(error, CaptureErrorKind::LargeStrips(60_000)));
+    }
+}

@@ -1,0 +1,162 @@
+//! A capture whose photographs are TIFFs, of which stages read only the rows they need.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::stage::{Job, LEARNED, NNLS, fails, succeeds, text};
+
+/// Bytes of a row of 64 pixels, and rows of a strip.
+const ROW_BYTES: usize = 64 * 6;
+const STRIP_ROWS: usize = 16;
+/// Where the first strip begins: after the header and the resolution.
+const STRIPS_START: usize = 24;
+
+fn ingest<'a>(from: &'a Path, to: &'a Path) -> [&'a str; 5] {
+    ["stage", "ingest", text(from), "-o", text(to)]
+}
+
+/// Ingests the capture of a job, and makes the copy its capture. Returns the folder of the source.
+fn ingest_capture(job: &mut Job) -> PathBuf {
+    let copy = job.path("ingested");
+    succeeds(&ingest(&job.capture, &copy));
+    std::mem::replace(&mut job.capture, copy)
+}
+
+/// Damages the strips of all photographs for whose numbers `is_damaged` is true.
+fn damage(capture: &Path, is_damaged: impl Fn(usize) -> bool) {
+    for entry in fs::read_dir(capture.join("photos")).unwrap() {
+        let path = entry.unwrap().path();
+        let mut bytes = fs::read(&path).unwrap();
+        for strip in (0..400 / STRIP_ROWS).filter(|strip| is_damaged(*strip)) {
+            bytes[STRIPS_START + strip * STRIP_ROWS * ROW_BYTES + 7] ^= 1;
+        }
+        fs::write(&path, bytes).unwrap();
+    }
+}
+
+#[test]
+fn an_ingested_capture_is_recovered_to_the_same_picture() {
+    let mut job = Job::new("64x400", &["--fault", "clip=0.4"], &LEARNED);
+    let source = job.recover(&[]);
+    // In any order; the last writes the manifest.
+    let copy = job.path("ingested");
+    for (shard, is_last) in [("2/3", false), ("3/3", false), ("1/3", true)] {
+        succeeds(&[&ingest(&job.capture, &copy)[..], &["--shard", shard]].concat());
+        assert_eq!(copy.join("capture.json").exists(), is_last);
+    }
+    job.capture = copy;
+    let recovered = job.recover(&[]);
+    assert!(recovered.0 == source.0);
+    let without_names = |report: &serde_json::Value| report.to_string().replace(".tif", ".png");
+    let reports = [&source.1, &recovered.1].map(without_names);
+    let folders = reports[1].replace("ingested/capture.json", "capture/capture.json");
+    assert_eq!(reports[0], folders);
+    // Until the manifest is changed: the hash of the inputs is then another one.
+    let manifest = job.capture.join("capture.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.clone() + "\n").unwrap();
+    assert!(job.recover(&[]).0 != source.0);
+    fs::write(&manifest, text).unwrap();
+    // The stages write the bytes of `recover`.
+    job.plan(&[]);
+    job.learn();
+    for shard in ["2/2", "1/2"] {
+        job.tiles(shard);
+    }
+    assert!(job.assemble(2).0 == recovered.0);
+}
+
+#[test]
+fn a_shard_reads_only_its_strips() {
+    let mut job = Job::new("64x400", &[], &LEARNED);
+    ingest_capture(&mut job);
+    job.plan(&[]);
+    job.learn();
+    job.tiles("2/4");
+    let pack = job.pack("2-of-4.pack");
+    let expected = fs::read(&pack).unwrap();
+    fs::remove_file(&pack).unwrap();
+    // Rows 128 to 255 and two more on either side: 10 strips of 16 rows, 1.25 times as many as 128 rows have.
+    damage(&job.capture, |strip| !(7..17).contains(&strip));
+    job.tiles("2/4");
+    assert!(fs::read(&pack).unwrap() == expected);
+    for (shard, rows) in [("1/4", "rows 0 to 15 "), ("3/4", "rows 272 to 287 ")] {
+        fails(&job.tiles_args(shard), 65, &["photos/", rows]);
+    }
+}
+
+#[test]
+fn ingesting_again_writes_what_has_changed() {
+    let mut job = Job::new("64x64", &[], &NNLS);
+    let source = ingest_capture(&mut job);
+    let (copy, manifest) = (job.capture.clone(), job.capture.join("capture.json"));
+    let again = ingest(&source, &copy);
+    let written = |path: &Path| fs::metadata(path).unwrap().modified().unwrap();
+    let photograph = copy.join("photos/0001.tif");
+    let before = [&manifest, &photograph].map(|path| written(path));
+    let said = succeeds(&again).stdout;
+    assert!(String::from_utf8_lossy(&said).contains(": 0 files written"));
+    assert_eq!([&manifest, &photograph].map(|path| written(path)), before);
+    // Another photograph: only that, and a plan of the old one is refused.
+    job.plan(&[]);
+    job.learn();
+    fs::copy(
+        source.join("photos/0002.png"),
+        source.join("photos/0001.png"),
+    )
+    .unwrap();
+    let parts = [&again[..], &["--shard", "1/2"]].concat();
+    let others = [&again[..], &["--shard", "2/2"]].concat();
+    let said = [parts, others].map(|args| succeeds(&args).stdout);
+    let said = said.map(|said| String::from_utf8(said).unwrap()).concat();
+    assert!(said.contains(": 1 files written"), "{said}");
+    fails(&job.tiles_args("1/1"), 65, &["0001.tif has changed since"]);
+    // What was ingested is copied as it is.
+    let third = job.path("third");
+    succeeds(&ingest(&copy, &third));
+    assert!(fs::read(third.join("photos/0001.tif")).unwrap() == fs::read(&photograph).unwrap());
+}
+
+#[test]
+fn files_of_others_are_not_replaced() {
+    let job = Job::new("64x64", &[], &NNLS);
+    let capture = &job.capture;
+    fails(&ingest(capture, capture), 1, &["is the capture itself"]);
+    let copy = job.path("copy");
+    fs::create_dir_all(copy.join("photos")).unwrap();
+    fs::write(copy.join("photos/0004.tif"), "mine").unwrap();
+    let other = "copy: is not empty, and this command did not write it";
+    fails(&ingest(capture, &copy), 1, &[other]);
+    assert_eq!(fs::read(copy.join("photos/0004.tif")).unwrap(), b"mine");
+    fs::remove_dir_all(&copy).unwrap();
+    // Photographs that would have one name, and one outside the folder.
+    let manifest = capture.join("capture.json");
+    let json = fs::read_to_string(&manifest).unwrap();
+    for (name, words) in [
+        ("photos/0003.jpg", "would have one name as TIFFs"),
+        ("../0004.png", "\"../0004.png\" is outside the folder"),
+    ] {
+        fs::write(&manifest, json.replace("photos/0004.png", name)).unwrap();
+        fails(&ingest(capture, &copy), 1, &[words]);
+    }
+    fs::write(&manifest, &json).unwrap();
+    // A damaged photograph is told, and the manifest waits for it.
+    let photo = capture.join("photos/0004.png");
+    let bytes = fs::read(&photo).unwrap();
+    fs::write(&photo, &bytes[..bytes.len() / 2]).unwrap();
+    fails(
+        &ingest(capture, &copy),
+        65,
+        &["photos/0004.png (shots[4].photo"],
+    );
+    assert!(!copy.join("capture.json").exists());
+    assert!(!copy.join("photos/0004.tif").exists());
+    fs::write(&photo, &bytes).unwrap();
+    succeeds(&ingest(capture, &copy));
+    // A pattern that is replaced.
+    let pattern = fs::read(capture.join("patterns/0005.png")).unwrap();
+    fs::write(capture.join("patterns/0004.png"), &pattern).unwrap();
+    let said = succeeds(&ingest(capture, &copy)).stdout;
+    assert!(String::from_utf8_lossy(&said).contains(": 1 files written"));
+    assert!(fs::read(copy.join("patterns/0004.png")).unwrap() == pattern);
+}
