@@ -47,6 +47,8 @@ def simulate(folder, seed, camera="64x64"):
 class WorkflowTest(unittest.TestCase):
     """A folder with captures, made once for each class, and one for results."""
 
+    config = ()
+
     @classmethod
     def setUpClass(cls):
         cls.folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
@@ -57,7 +59,7 @@ class WorkflowTest(unittest.TestCase):
 
     def command(self, *options):
         """The command that recovers the captures."""
-        config = ["--config", f"options={OPTIONS}", "memory_mb=1000", "shards=3", "shard_pixels=10000"]
+        config = ["--config", f"options={OPTIONS}", "memory_mb=1000", "shards=3", "shard_pixels=10000", *self.config]
         return [str(REPO / "pkg-scripts/cluster"), str(self.captures), "-o", str(self.results), *options, *config]
 
     def workflow(self, *options, status=0, program=PROGRAM):
@@ -178,13 +180,22 @@ class KilledDriverTest(WorkflowTest):
         self.assert_recovered(*(f"c{seed}" for seed in range(1, 7)))
 
 
+# The jobs of a capture in three shards, sorted.
+STAGES = [
+    "assemble",
+    *(f"ingest {i} of 3" for i in range(1, 4)),
+    "learn",
+    "plan",
+    *(f"recover tiles {i} of 3" for i in range(1, 4)),
+]
+
+
 class ShardsTest(WorkflowTest):
     """A capture in shards on this machine."""
 
     def test_shards_give_the_bytes_of_recover(self):
         simulate(self.captures / "large", 1, "128x128")
-        stages = ["assemble", "learn", "plan", *(f"recover tiles {i} of 3" for i in range(1, 4))]
-        self.assertEqual(self.workflow(), [f"large: {stage}" for stage in stages])
+        self.assertEqual(self.workflow(), [f"large: {stage}" for stage in STAGES])
         self.assert_recovered("large")
         self.assertFalse((self.results / "stages/large").exists())
         self.assertEqual(self.workflow(), [])
@@ -205,6 +216,17 @@ class ShardsTest(WorkflowTest):
         self.assert_recovered("at fault")
 
 
+class ShardsOfPngsTest(WorkflowTest):
+    """A capture in shards that is not ingested."""
+
+    config = ("ingest=false",)
+
+    def test_shards_give_the_bytes_of_recover(self):
+        simulate(self.captures / "large", 3, "128x128")
+        self.assertEqual(self.workflow(), [f"large: {stage}" for stage in STAGES if "ingest" not in stage])
+        self.assert_recovered("large")
+
+
 # Stands for ltm-export without any work. The file "fails" has lines of a stage or capture and its exit status.
 PRETENDER = """#!/bin/sh
 key=$1
@@ -220,6 +242,7 @@ for argument; do
   before=$argument
 done
 case $key in
+  ingest) mkdir -p "$output" && echo "$key" >"$output/capture.json" ;;
   plan) mkdir -p "$output/shards" && echo plan >"$output/plan.json" ;;
   learn) echo learned >"$3/learned.bin" ;;
   tiles) echo tiles >"$3/shards/${5%/*}-of-${5#*/}.pack" ;;
@@ -254,8 +277,7 @@ class EngineTest(WorkflowTest):
         return [row["status"] for _, row in sorted(self.report().items())]
 
     def test_the_engine(self):
-        stages = ["assemble", "learn", "plan", *(f"recover tiles {i} of 3" for i in range(1, 4))]
-        large = [f"large: {stage}" for stage in stages]
+        large = [f"large: {stage}" for stage in STAGES]
         everything = ["a: recover", "b: recover", *large]
         self.assertEqual(self.run_with(), everything)
         self.assertEqual(self.run_with(), [])
@@ -281,7 +303,8 @@ class EngineTest(WorkflowTest):
             self.run_with(fails="learn 65\n")
             self.assertEqual(self.report()["large"]["exit_status"], "65")
             (self.results / "large.result.json").unlink()
-            self.assertEqual(self.run_with(), [job for job in large if job != "large: plan"])
+            done = [f"large: ingest {i} of 3" for i in range(1, 4)] + ["large: plan"]
+            self.assertEqual(self.run_with(), [job for job in large if job not in done])
 
         with self.subTest("a temporary failure shows the last error, of any stage"):
             self.run_with(fails="tiles 75\nb 101\n", changed=["a", "b", "large"], status=1)
@@ -503,14 +526,52 @@ class OtherSlurmTest(unittest.TestCase):
         self.assertFalse(self.configuration.exists())
 
 
+class FullDiskTest(WorkflowTest):
+    """A disk without space: a small file system in memory."""
+
+    def test_a_stage_succeeds_once_there_is_space(self):
+        simulate(self.captures / "large", 1, "256x256")
+        self.results.mkdir()
+        mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", str(self.results)]
+        if subprocess.run(mount, capture_output=True).returncode != 0:
+            if os.environ.get("CI"):
+                self.fail("a small file system cannot be mounted")
+            self.skipTest("a small file system cannot be mounted")
+        self.addCleanup(subprocess.run, ["umount", str(self.results)])
+        stages, file = self.results / "stages", self.results / "large.ltm"
+        filler = self.results / "filler"
+        ltm_export("stage", "plan", self.captures / "large", "-o", stages, *OPTIONS.split())
+        recovered = self.folder / "recovered.ltm"
+        ltm_export("recover", self.captures / "large", "-o", recovered, *OPTIONS.split())
+        for command in (
+            ["learn", stages],
+            ["tiles", stages, "--shard", "1/1"],
+            ["assemble", stages, "--shards", "1", "-o", file],
+        ):
+            self.resize("400k")
+            free = shutil.disk_usage(self.results).free
+            filler.write_bytes(bytes(max(0, free - 8192)))
+            ended = subprocess.run([PROGRAM, "stage", *command], capture_output=True, text=True)
+            self.assertEqual(ended.returncode, 75, f"{command}: {ended.stderr}")
+            self.assertIn("No space left on device", ended.stderr)
+            filler.unlink()
+            self.resize("200m")
+            ltm_export("stage", *command)
+        self.assertEqual(file.read_bytes(), recovered.read_bytes())
+
+    def resize(self, size):
+        """Changes the size of the file system; it cannot be smaller than its files."""
+        subprocess.run(["mount", "-o", f"remount,size={size}", str(self.results)], capture_output=True)
+
+
 class SlurmTest(WorkflowTest):
     """Slurm with two nodes, on this machine."""
 
     def setUp(self):
-        slurm = TwoNodeSlurm(self.folder / "slurm")
-        self.addCleanup(slurm.stop)
+        self.slurm = TwoNodeSlurm(self.folder / self.id().split(".")[-1])
+        self.addCleanup(self.slurm.stop)
         try:
-            slurm.start()
+            self.slurm.start()
         except SlurmUnavailable as error:
             # With CI set, a Slurm that is missing is an error.
             if os.environ.get("CI"):
@@ -528,19 +589,89 @@ class SlurmTest(WorkflowTest):
         self.assertEqual(self.report()["c3"]["exit_status"], "65")
 
         array = self.folder / "array.ltm"
-        command = [str(REPO / "workflow/array.sbatch"), str(self.captures / "large"), str(array), "3", "--mem=1500"]
-        environment = os.environ | {"LTM_EXPORT": PROGRAM, "OPTIONS": OPTIONS}
-        jobs = subprocess.run(command, check=True, env=environment, capture_output=True, text=True)
-        last = jobs.stdout.split()[-1]
-        wait_until(lambda: job_state(last) not in ("PENDING", "RUNNING", "COMPLETING"), SECONDS)
-        self.assertEqual(job_state(last), "COMPLETED")
+        self.await_success(self.submit_array("large", array, 3)[-1])
         self.assertEqual(array.read_bytes(), (self.results / "large.ltm").read_bytes())
+
+    def test_a_lost_node(self):
+        """Its daemon, the job's daemon and the job are killed: the shard continues on the other node."""
+        running = self.shard_on_a_node()
+        self.slurm.kill_node(running.node)
+        for pid in (*processes(f"slurmstepd: [{running.tiles}"), *running.pids()):
+            os.kill(pid, signal.SIGKILL)
+        self.await_success(running.assemble)
+        self.assertIn("resuming with", running.log())
+        self.assertEqual(running.file.read_bytes(), running.expected)
+
+    def test_two_writers(self):
+        """Only the node's daemon is killed: Slurm starts the shard again while the first process lives."""
+        running = self.shard_on_a_node()
+        (first,) = running.pids()
+        self.slurm.kill_node(running.node)
+        os.kill(first, signal.SIGSTOP)
+        wait_until(lambda: len(running.pids()) == 2, SECONDS)
+        os.kill(first, signal.SIGCONT)
+        self.await_success(running.assemble)
+        wait_until(lambda: not running.pids(), SECONDS)
+        self.assertEqual(running.file.read_bytes(), running.expected)
+        shards = sorted(path.name for path in (running.stages / "shards").iterdir())
+        self.assertEqual(shards, ["1-of-2.pack", "2-of-2.pack"])
+
+    def submit_array(self, capture, file, shards):
+        """Submits a capture. Returns the numbers of the jobs."""
+        command = [str(REPO / "workflow/array.sbatch"), str(self.captures / capture), str(file), str(shards)]
+        environment = os.environ | {"LTM_EXPORT": PROGRAM, "OPTIONS": OPTIONS}
+        jobs = subprocess.run([*command, "--mem=1500"], check=True, env=environment, capture_output=True, text=True)
+        return re.findall(r"\d+", jobs.stdout.split(";")[0])
+
+    def await_success(self, job):
+        """Waits for the end of a job."""
+        wait_until(lambda: job_state(job) not in ("PENDING", "RUNNING", "COMPLETING"), SECONDS)
+        self.assertEqual(job_state(job), "COMPLETED")
+
+    def shard_on_a_node(self):
+        """Submits a capture in two shards, and waits until tiles of the first are recovered."""
+        simulate(self.captures / "large", 1, "256x256")
+        running = RunningShard(self.folder, self.captures / "large")
+        *_, running.tiles, running.assemble = self.submit_array("large", running.file, 2)
+        partial = running.stages / "shards"
+        wait_until(lambda: any(path.stat().st_size > 20_000 for path in partial.glob("1-of-2.*.partial")), SECONDS)
+        name = subprocess.run(["squeue", "-h", "-j", f"{running.tiles}_1", "-o", "%N"], capture_output=True, text=True)
+        running.node = name.stdout.strip()
+        return running
+
+
+class RunningShard:
+    """The first of two shards, while it runs on a node."""
+
+    def __init__(self, folder, capture):
+        self.file = folder / "large.ltm"
+        self.stages = folder / "large-stages"
+        self.node = self.tiles = self.assemble = None
+        recovered = folder / "recovered.ltm"
+        ltm_export("recover", capture, "-o", recovered, *OPTIONS.split())
+        self.expected = recovered.read_bytes()
+
+    def pids(self):
+        """Its processes: one for each time that Slurm started it."""
+        arguments = ("stage", "tiles", str(self.stages), "--shard", "1/2")
+        return processes("\0".join(arguments), PROGRAM)
+
+    def log(self):
+        """What the processes printed."""
+        return "".join(path.read_text(encoding="utf-8") for path in (self.stages / "logs").glob("slurm-*_1.out"))
 
 
 def job_state(job):
     """State of a job of Slurm."""
     answer = subprocess.run(["scontrol", "show", "job", job], capture_output=True, text=True)
     return re.search(r"JobState=(\w+)", answer.stdout)[1]
+
+
+def processes(text, program=""):
+    """Process ids of commands with a text in their arguments, of this program."""
+    commands = [(path.parent.name, read_bytes(path)) for path in Path("/proc").glob("[0-9]*/cmdline")]
+    commands = [(pid, command) for pid, command in commands if command.startswith(program.encode())]
+    return [int(pid) for pid, command in commands if text.encode() in command]
 
 
 def commands_on(folder):

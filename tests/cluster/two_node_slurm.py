@@ -52,6 +52,7 @@ class TwoNodeSlurm:
     def __init__(self, folder):
         self.folder = folder
         self.daemons = []
+        self.nodes = {}
         self.settings = None
 
     def start(self):
@@ -72,7 +73,7 @@ class TwoNodeSlurm:
         self._start_munge()
         self._start("slurmctld", "-D")
         for node in ("n1", "n2"):
-            self._start("slurmd", "-D", "-N", node)
+            self.nodes[node] = self._start("slurmd", "-D", "-N", node)
         wait_until(lambda: nodes_that_are("idle") == 2, 60)
 
     def _start_munge(self):
@@ -91,6 +92,11 @@ class TwoNodeSlurm:
         with log:
             daemon = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
         self.daemons.append(daemon)
+        return daemon
+
+    def kill_node(self, node):
+        """Kills the daemon of a node, which leaves its jobs."""
+        os.kill(self.nodes[node].pid, signal.SIGKILL)
 
     def stop(self):
         """Cancels all jobs, stops the daemons and removes the configuration, if it is still the one of this object."""

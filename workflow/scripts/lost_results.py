@@ -5,7 +5,7 @@ from pathlib import Path
 from write_page import read_json
 
 SUFFIX = ".result.json"
-STAGE_FILES = {"plan": "plan.json", "learn": "learned.bin"}
+STAGE_FILES = {"ingest": "ingested/capture.json", "plan": "plan.json", "learn": "learned.bin"}
 
 
 def remove_lost_results(name):
@@ -26,5 +26,5 @@ def remove_lost_results(name):
 def is_lost(path):
     """Whether a stage failed, or its file is gone."""
     stage = path.name.removesuffix(SUFFIX)
-    file = path.parent / STAGE_FILES.get(stage, f"shards/{stage}.pack")
+    file = path.parent / STAGE_FILES.get(stage.split("-")[0], f"shards/{stage}.pack")
     return (read_json(path) or {}).get("status") != "done" or not file.exists()
