@@ -140,20 +140,6 @@ impl CameraPixelSet {
         self.rows.count() * self.width as usize
     }
 
-    /// A list of the pixels, parted into the spans of the rows.
-    #[cfg(feature = "capture")]
-    pub fn split<'a, T>(&self, mut list: &'a [T]) -> Vec<&'a [T]> {
-        let mut parts = Vec::new();
-        for y in self.rows.iter() {
-            for span in self.spans_of(y) {
-                let (part, rest) = list.split_at(span.len().min(list.len()));
-                parts.push(part);
-                list = rest;
-            }
-        }
-        parts
-    }
-
     /// Number of pixels above row `y`.
     pub fn count_above(&self, y: u32) -> usize {
         let above = self.rows.iter().take_while(|row| *row < y).count();

@@ -7,6 +7,12 @@ use thiserror::Error;
 use crate::calibrate::LightPlaneAxis;
 use crate::transport::Extent;
 
+/// Formats of photographs; pages read PNG only.
+#[cfg(not(target_arch = "wasm32"))]
+const PHOTO_FORMATS: &str = "PNG or TIFF";
+#[cfg(target_arch = "wasm32")]
+const PHOTO_FORMATS: &str = "PNG";
+
 /// The manifest's file name.
 pub const MANIFEST_NAME: &str = "capture.json";
 
@@ -118,7 +124,7 @@ pub enum CaptureErrorKind {
         expected: Extent,
     },
     /// A photograph has another sample type.
-    #[error("is {0}; a photograph must be 16-bit linear RGB")]
+    #[error("is {0}; a photograph must be a 16-bit linear RGB {PHOTO_FORMATS}")]
     PhotoType(String),
     /// A pattern has another sample type.
     #[error("is {0}; a pattern must be an 8-bit grey or RGB PNG")]

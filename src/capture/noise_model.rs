@@ -26,18 +26,20 @@ pub struct NoiseModel {
 impl NoiseModel {
     /// Estimates the floor from a dark frame with rows of `width` pixels, see [`from_dark_rows`](Self::from_dark_rows).
     pub fn from_dark(dark: &[[f32; CHANNELS]], width: u32, quantum: f64) -> Self {
-        let rows: Vec<_> = dark.chunks_exact(width as usize).collect();
-        Self::from_dark_rows(&rows, quantum)
+        Self::from_dark_rows(dark.chunks_exact(width as usize), quantum)
     }
 
     /// Estimates the floor from rows of a dark frame, or parts of them; the gain is zero.
     ///
     /// The floor is half the mean squared difference of horizontal neighbours, and at least the variance of rounding to
     /// codes `quantum` apart.
-    pub fn from_dark_rows(rows: &[&[[f32; CHANNELS]]], quantum: f64) -> Self {
+    pub fn from_dark_rows<'a>(
+        rows: impl Iterator<Item = &'a [[f32; CHANNELS]]> + Clone,
+        quantum: f64,
+    ) -> Self {
         let rounding = quantum * quantum / 12.0;
         let floor = std::array::from_fn(|c| {
-            let differences = rows.iter().flat_map(|row| {
+            let differences = rows.clone().flat_map(|row| {
                 let pairs = row.chunks_exact(2);
                 pairs.map(|pair| f64::from(pair[1][c]) - f64::from(pair[0][c]))
             });

@@ -11,7 +11,7 @@ use super::ltm_file::LtmFileError;
 use super::output_file::InputError;
 use super::process_resources::{INTERRUPTED_STATUS, Interrupted};
 use super::recover::{CheckpointInUseError, FaultyPhotographsError, StrictError, UnusableError};
-use super::stage::StageFileError;
+use super::stage::{IngestNameError, StageFileError};
 use super::value_parsers::UsageError;
 use crate::calibrate::CalibrationError;
 use crate::capture::{CaptureError, CaptureErrorKind};
@@ -146,6 +146,7 @@ fn is_of_data(cause: Cause<'_>) -> bool {
         || cause.is::<CalibrationError>()
         || cause.is::<LtmFileError>()
         || cause.is::<StageFileError>()
+        || cause.is::<IngestNameError>()
         || cause.is::<PhotoFileError>()
         || cause.downcast_ref().is_some_and(is_of_photographs)
         || cause.downcast_ref().is_some_and(is_of_file)

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use serde_json::Value;
 
 use super::object_text::ObjectText;
 use crate::capture::MANIFEST_NAME;
 
 /// The manifest of the source in the folder of its copy.
-pub const SOURCE_MANIFEST: &str = "source.json";
+pub const SOURCE_MANIFEST: &str = "ingested-from.json";
 
 /// `a/b.png` as `a/b.tif`.
 pub fn tiff_name(name: &str) -> String {
@@ -47,8 +48,13 @@ pub fn ingested_manifest(path: &Path) -> Result<String> {
 /// Whether the manifest of the capture folder `root` is that of its source, but for the names of photographs.
 pub fn is_of_source(root: &Path) -> bool {
     let source = root.join(SOURCE_MANIFEST);
-    let text = std::fs::read_to_string(root.join(MANIFEST_NAME));
-    source.exists() && text.is_ok_and(|text| ingested_manifest(&source).is_ok_and(|of| of == text))
+    let is_of = || -> Result<bool> {
+        let copy = std::fs::read_to_string(root.join(MANIFEST_NAME))?;
+        let [copy, expected] = [copy, ingested_manifest(&source)?];
+        let value = |text: String| serde_json::from_str::<Value>(&text);
+        Ok(value(copy)? == value(expected)?)
+    };
+    source.exists() && is_of().unwrap_or(false)
 }
 
 #[cfg(test)]
@@ -68,7 +74,7 @@ mod tests {
         let json = |shot: &str| format!(r#"{{{first}, "dark": "d.png", "shots": [{shot}]}}"#);
         fs::write(&path, json(shot)).unwrap();
         let text = ingested_manifest(&path).unwrap();
-        let value = |text: &str| -> serde_json::Value { serde_json::from_str(text).unwrap() };
+        let value = |text: &str| -> Value { serde_json::from_str(text).unwrap() };
         let expected = json(shot)
             .replace("a.png", "a.tif")
             .replace("d.png", "d.tif");
@@ -77,7 +83,7 @@ mod tests {
         // Until either is changed.
         let copy = folder.path().join(MANIFEST_NAME);
         assert!(!is_of_source(folder.path()));
-        fs::write(&copy, &text).unwrap();
+        fs::write(&copy, text.replace('\n', " ")).unwrap();
         assert!(is_of_source(folder.path()));
         fs::write(&copy, text.replace("1.50", "1.60")).unwrap();
         assert!(!is_of_source(folder.path()));

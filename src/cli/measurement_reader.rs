@@ -102,7 +102,9 @@ impl<'a> MeasurementReader<'a> {
             photo.drain(..obsolete);
             // Strips have similar heights, so the first reservation is enough for all.
             photo.reserve_exact(pixels.count().saturating_sub(photo.len()));
-            Ok::<_, Error>(reader.read(pixels, dark, photo)?)
+            reader.read(pixels, dark, photo)?;
+            reader.release();
+            Ok::<_, Error>(())
         })?;
         measurements.loaded = pixels.clone();
         Ok(())

@@ -259,7 +259,7 @@ fn read_measurements(folder: &CaptureFolder) -> Result<Measurements> {
     let pixels = CameraPixelSet::all(camera);
     let dark = folder.read_dark(&pixels)?;
     let gray_code_rows = CameraRowSet::all(camera.height);
-    let mut measurements = read_patterns(folder, dark.noise(), &shots, &gray_code_rows)?;
+    let mut measurements = read_patterns(folder, dark.noise(&pixels), &shots, &gray_code_rows)?;
     let reader = MeasurementReader::open(folder, &shots)?;
     reader.read_sample(&mut measurements, &dark, &pixels, CORES)?;
     Ok(measurements)

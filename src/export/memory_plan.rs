@@ -64,6 +64,8 @@ pub struct CaptureSize {
 pub struct MemoryPlan {
     camera: Extent,
     /// The pixels to prepare the recovery from.
+    prepared: CameraPixelSet,
+    /// The pixels that are loaded for that.
     sample: CameraPixelSet,
     gray_code_rows: CameraRowSet,
     /// Number of camera rows of the photographs that are loaded at once.
@@ -210,8 +212,9 @@ impl MemoryPlan {
             camera,
             sample: match fits_all {
                 true => CameraPixelSet::all(camera),
-                false => sample,
+                false => sample.clone(),
             },
+            prepared: sample,
             gray_code_rows,
             rows_at_once: match fits_all {
                 true => camera.height,
@@ -239,6 +242,11 @@ impl MemoryPlan {
     /// Whether all photographs fit in memory.
     pub fn fits_photographs(&self) -> bool {
         self.rows_at_once >= self.camera.height
+    }
+
+    /// The camera pixels that the preparation reads, whatever the limit.
+    pub fn prepared(&self) -> &CameraPixelSet {
+        &self.prepared
     }
 
     /// The camera pixels to load for the preparation: all if they fit, otherwise those that it reads.
@@ -352,6 +360,9 @@ mod tests {
         assert_eq!(low.sample, high.sample);
         assert!(2 * low.sample.count() < CAMERA.area());
         assert_eq!(low.gray_code_rows, high.gray_code_rows);
+        let whole = plan(4000, CAMERA, 2).unwrap();
+        assert_eq!(whole.sample.count(), CAMERA.area());
+        assert_eq!(whole.prepared, low.prepared);
         // A small picture is prepared from all of it.
         let small = Extent::new(500, 300);
         assert!(
@@ -379,28 +390,28 @@ mod tests {
     fn tiles_alone_take_less_memory_than_a_recovery() {
         let window = Window::new(9).unwrap();
         let size = CaptureSize {
-            camera: Extent::new(16_000, 16_000),
+            camera: Extent::new(4000, 4000),
             light: Extent::new(64, 64),
             shots: 80,
             gray_code: 24,
         };
-        let of_tiles = |limit| MemoryPlan::of_tiles(limit, size, Method::Learned, window, 2);
-        let whole = MemoryPlan::new(0, size, Method::Learned, Some(window), 2).unwrap_err();
+        let method = Method::Learned;
+        let of_tiles = |limit| MemoryPlan::of_tiles(limit, size, method, window, 2);
+        let whole = MemoryPlan::new(0, size, method, Some(window), 2).unwrap_err();
         let min = of_tiles(0).unwrap_err().min;
-        assert!(min < whole.min, "{min} {}", whole.min);
-        let plan = of_tiles(min).unwrap();
-        assert_eq!(plan.strips(0..25, 8)[0], (0..1, 0..40));
-        // The rows of 80 photographs, with which the flood photograph and the dark frame may be.
-        let rows =
-            16_000 * 82 * PIXEL_BYTES * u64::from(TILE_SIDE + 2 * Method::Learned.max_halo());
-        assert!(min < rows + (1 << 30), "{min}");
-        let encoding = EncodingMemory::min_bytes(size.camera, window, 20);
-        assert!(encoding < min);
-        let encode =
-            |limit| EncodingMemory { limit, threads: 8 }.tiles_at_once(size.camera, window, 20);
-        assert_eq!(encode(encoding), Ok(1));
-        assert_eq!(encode(encoding - 1).unwrap_err().min, encoding);
-        assert_eq!(encode(4 << 30), Ok(8));
+        assert!(2 * min < whole.min, "{min} {}", whole.min);
+        let halo = method.max_halo();
+        assert_eq!(
+            of_tiles(min).unwrap().strips(0..25, halo)[0],
+            (0..1, 0..32 + halo)
+        );
+        let memory = |limit| EncodingMemory { limit, threads: 8 };
+        let encoders = |limit| memory(limit).tiles_at_once(size.camera, window, 20);
+        let least = EncodingMemory::min_bytes(size.camera, window, 20);
+        assert!(least < min);
+        assert_eq!(encoders(least), Ok(1));
+        assert_eq!(encoders(least - 1).unwrap_err().min, least);
+        assert_eq!(encoders(4 << 30), Ok(8));
     }
 
     #[test]

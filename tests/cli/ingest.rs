@@ -54,7 +54,7 @@ fn an_ingested_capture_is_recovered_to_the_same_picture() {
     // Until the manifest is changed: the hash of the inputs is then another one.
     let manifest = job.capture.join("capture.json");
     let text = fs::read_to_string(&manifest).unwrap();
-    fs::write(&manifest, text.clone() + "\n").unwrap();
+    fs::write(&manifest, text.replacen('{', "{\"own\": 1,", 1)).unwrap();
     assert!(job.recover(&[]).0 != source.0);
     fs::write(&manifest, text).unwrap();
     // The stages write the bytes of `recover`.
@@ -137,8 +137,12 @@ fn files_of_others_are_not_replaced() {
         ("../0004.png", "\"../0004.png\" is outside the folder"),
     ] {
         fs::write(&manifest, json.replace("photos/0004.png", name)).unwrap();
-        fails(&ingest(capture, &copy), 1, &[words]);
+        fails(&ingest(capture, &copy), 65, &["capture.json", words]);
     }
+    // A file may be named in several ways.
+    let again = json.replacen("photos/0003.png", "./photos//0004.png", 1);
+    fs::write(&manifest, again).unwrap();
+    succeeds(&ingest(capture, &job.path("named")));
     fs::write(&manifest, &json).unwrap();
     // A damaged photograph is told, and the manifest waits for it.
     let photo = capture.join("photos/0004.png");
@@ -151,6 +155,9 @@ fn files_of_others_are_not_replaced() {
     );
     assert!(!copy.join("capture.json").exists());
     assert!(!copy.join("photos/0004.tif").exists());
+    fs::remove_file(&photo).unwrap();
+    let missing = ["photos/0004.png (shots[4].photo", "there is no such file"];
+    fails(&ingest(capture, &copy), 65, &missing);
     fs::write(&photo, &bytes).unwrap();
     succeeds(&ingest(capture, &copy));
     // A pattern that is replaced.

@@ -179,8 +179,12 @@ fn embedded_fixture_equals_its_folder() {
     let shots: Vec<usize> = (0..folder.manifest().shots.len()).collect();
     let patterns = shots.iter().map(|&i| folder.read_pattern(i).unwrap());
     let correspondence = folder.manifest().correspondence.clone().unwrap();
-    let mut read =
-        folder.empty_measurements(&shots, patterns.collect(), correspondence, dark.noise());
+    let mut read = folder.empty_measurements(
+        &shots,
+        patterns.collect(),
+        correspondence,
+        dark.noise(&CameraPixelSet::all(camera)),
+    );
     read.loaded = CameraPixelSet::all(read.camera);
     let whole = |mut photo: PhotographRowReader| {
         let mut picture = LinearPhoto::new();

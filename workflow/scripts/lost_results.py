@@ -11,15 +11,17 @@ STAGE_FILES = {"ingest": "ingested/capture.json", "plan": "plan.json", "learn": 
 def remove_lost_results(name):
     """Removes the result of a capture whose file is gone.
 
-    Without this result, also those of its stages that failed or whose file is gone.
+    Without this result, also those of its stages that failed or whose file is gone; if there are any, those of ingesting as
+    well, as a photograph of the copy may be damaged or gone.
     """
     result = Path(name + SUFFIX)
     file = (read_json(result) or {}).get("file")
     if file and not Path(file).exists():
         result.unlink()
     if not result.exists():
-        for stage in Path("stages", name).glob("*" + SUFFIX):
-            if is_lost(stage):
+        stages = list(Path("stages", name).glob("*" + SUFFIX))
+        if lost := {stage for stage in stages if is_lost(stage)}:
+            for stage in lost.union(stage for stage in stages if stage.name.startswith("ingest-")):
                 stage.unlink()
 
 

@@ -21,21 +21,30 @@ pub struct DarkFrame {
     above: usize,
     /// In units of the measurement.
     light: LinearPhoto,
-    /// The measurement of one code.
+    /// The measurement of one code, at exposure 1.
     code: f64,
 }
 
 impl DarkFrame {
-    /// The columns `span` of row `y`, which are among its pixels.
+    /// The columns `span` of row `y`.
+    ///
+    /// # Panics
+    /// If these are not among its pixels.
     pub(super) fn span(&self, y: u32, span: &Range<u32>) -> &[[f32; CHANNELS]] {
         let pixel = CameraPixel { x: span.start, y };
-        let first = self.pixels.index_of(pixel).unwrap_or_default();
+        let first = self.pixels.index_of(pixel).unwrap_or(usize::MAX);
         &self.light[first - self.above..][..span.len()]
     }
 
-    /// The noise floor estimated from its pixels, none of which were skipped; of rounding alone without a dark frame.
-    pub fn noise(&self) -> NoiseModel {
-        NoiseModel::from_dark_rows(&self.pixels.split(&self.light), self.code)
+    /// The noise floor estimated from `pixels`; of rounding alone without a dark frame.
+    ///
+    /// # Panics
+    /// If these are not among its pixels.
+    pub fn noise(&self, pixels: &CameraPixelSet) -> NoiseModel {
+        let rows = pixels.rows().iter();
+        let spans = rows.flat_map(|y| pixels.spans_of(y).map(move |span| (y, span)));
+        let spans: Vec<_> = spans.map(|(y, span)| self.span(y, &span)).collect();
+        NoiseModel::from_dark_rows(spans.into_iter(), self.code)
     }
 }
 
@@ -76,6 +85,13 @@ impl<F: CaptureFiles> DarkFrameReader<'_, F> {
             light,
             code: 1.0 / (camera.white - camera.black),
         })
+    }
+
+    /// Frees the memory of rows that were decoded, until the next are read.
+    pub fn release(&mut self) {
+        if let Some(codes) = &mut self.codes {
+            codes.release();
+        }
     }
 
     /// Checks the rest of the file.

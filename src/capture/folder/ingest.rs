@@ -7,13 +7,24 @@ use std::path::Path;
 use thiserror::Error;
 use tiff::TiffError;
 use tiff::decoder::Decoder;
+use tiff::encoder::colortype::RGB16;
+use tiff::encoder::{TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard};
 
 use super::CaptureFolder;
 use super::files::CaptureFiles;
-use super::ingest_record::{IngestRecord, IngestSource};
-use super::picture_tiff::{self, TAG_BYTES, is_tiff};
+use super::ingest_record::{CodeHistogram, IngestRecord, IngestSource};
+use super::photograph_codes::PhotographCodes;
+use super::picture_tiff::{TAG_BYTES, is_tiff};
 use crate::capture::error::CaptureError;
 use crate::capture::manifest::ListedPhotograph;
+use crate::transport::{CHANNELS, Extent};
+
+/// Rows of a strip.
+const STRIP_ROWS: u32 = 16;
+/// Largest strip that is read to write smaller ones.
+const MAX_INGESTED_STRIP_BYTES: usize = 1 << 30;
+/// Bytes of samples from which on offsets do not fit in 32 bits, with space for the rest of the file.
+const BIG_TIFF_BYTES: u64 = 0xF000_0000;
 
 /// Why a photograph is not ingested.
 #[derive(Debug, Error)]
@@ -47,8 +58,43 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         source: &IngestSource,
         out: impl Write + Seek,
     ) -> Result<(), IngestError> {
-        picture_tiff::write(self.listed(photograph), source, out)
+        let file = self.listed(photograph);
+        let codes = PhotographCodes::open_within(file, MAX_INGESTED_STRIP_BYTES)?;
+        let bytes = size_of::<[u16; CHANNELS]>() as u64 * codes.extent().area() as u64;
+        match bytes < BIG_TIFF_BYTES {
+            true => write::<_, _, TiffKindStandard>(codes, source, out),
+            false => write::<_, _, TiffKindBig>(codes, source, out),
+        }
     }
+}
+
+/// Writes a photograph, whose file is `source`, as an uncompressed TIFF of strips with their record.
+pub(super) fn write<F: CaptureFiles, W: Write + Seek, K: TiffKind>(
+    mut photograph: PhotographCodes<'_, F>,
+    source: &IngestSource,
+    out: W,
+) -> Result<(), IngestError> {
+    let Extent { width, height } = photograph.extent();
+    let mut encoder = TiffEncoder::<W, K>::new_generic(out)?;
+    let mut image = encoder.new_image::<RGB16>(width, height)?;
+    image.rows_per_strip(STRIP_ROWS.min(height))?;
+    let (mut checksums, mut histogram) = (Vec::new(), CodeHistogram::empty());
+    let mut strip: Vec<[u16; CHANNELS]> = Vec::new();
+    for y in 0..height {
+        if let Some(row) = photograph.next()? {
+            strip.extend_from_slice(row);
+        }
+        if (y + 1) % STRIP_ROWS == 0 || y + 1 == height {
+            let samples = strip.as_flattened();
+            image.write_strip(samples)?;
+            checksums.push(crc32c::crc32c(bytemuck::cast_slice(samples)));
+            histogram.add(&strip);
+            strip.clear();
+        }
+    }
+    photograph.finish([u32::MAX; CHANNELS])?;
+    IngestRecord::write(image.encoder(), source, checksums, &histogram)?;
+    Ok(image.finish()?)
 }
 
 /// A TIFF of [`CaptureFolder::ingest`], by its record.

@@ -1,14 +1,14 @@
-//! What `ltm-export stage ingest` says in a TIFF of the photograph that it holds, in tags of its own; see docs/capture.md.
+//! The record in a TIFF of `ltm-export stage ingest`: tags of its own, see docs/capture.md.
 //!
-//! With it the rows of a photograph are read without the others: the record has a checksum of each strip, and a histogram of
-//! all codes, from which their statistics follow for any saturation.
+//! The record has a checksum of each strip, so that a strip can be read and checked without the others, and a histogram of all
+//! codes, from which their statistics follow for any saturation.
 
 use std::io::{self, Read, Seek, Write};
 
 use serde::{Deserialize, Serialize};
 use tiff::decoder::Decoder;
 use tiff::encoder::{DirectoryEncoder, TiffKind};
-use tiff::tags::Tag;
+use tiff::tags::{Tag, Type, ValueBuffer};
 use tiff::{TiffError, TiffResult};
 
 use crate::capture::code_statistics::CodeStatistics;
@@ -30,7 +30,7 @@ const ZSTD_LEVEL: i32 = 9;
 pub struct IngestSource {
     /// Its name in the manifest.
     pub name: String,
-    /// Its length.
+    /// Its length in bytes.
     pub bytes: u64,
     /// Its SHA-256 in hexadecimal digits.
     pub sha256: String,
@@ -55,7 +55,8 @@ impl IngestRecord {
         };
         let source = decoder.get_tag_ascii_string(SOURCE)?;
         let checksums = decoder.get_tag_u32_vec(CHECKSUMS)?;
-        if checksum != record_checksum(&source, &checksums) {
+        let is_whole = checksums.len() == decoder.strip_count()? as usize + 1;
+        if !is_whole || checksum != record_checksum(&source, &checksums) {
             return Err(damaged());
         }
         Ok(Some(Self {
@@ -71,12 +72,21 @@ impl IngestRecord {
         decoder: &mut Decoder<R>,
         saturated_from: [u32; CHANNELS],
     ) -> TiffResult<CodeStatistics> {
-        let histogram = decoder.get_tag_u8_vec(HISTOGRAM)?;
-        if self.checksums.last() != Some(&crc32c::crc32c(&histogram)) {
+        let (width, height) = decoder.dimensions()?;
+        // Other functions make each byte a value of 32 bytes.
+        let mut histogram = ValueBuffer::empty(Type::BYTE);
+        decoder
+            .image_ifd()
+            .find_tag_buf(HISTOGRAM, &mut histogram)?;
+        let histogram = histogram.as_bytes();
+        if self.checksums.last() != Some(&crc32c::crc32c(histogram)) {
             return Err(damaged());
         }
-        let histogram = CodeHistogram::decompress(&histogram).ok_or_else(damaged)?;
-        Ok(histogram.statistics(saturated_from))
+        let histogram = CodeHistogram::decompress(histogram).ok_or_else(damaged)?;
+        match histogram.is_of(u64::from(width) * u64::from(height)) {
+            true => Ok(histogram.statistics(saturated_from)),
+            false => Err(damaged()),
+        }
     }
 
     /// Writes the tags of a photograph from `source`, with these `checksums` of its strips.
@@ -131,6 +141,15 @@ impl CodeHistogram {
         }
     }
 
+    /// Whether each channel has so many samples.
+    fn is_of(&self, pixels: u64) -> bool {
+        let mut channels = self.counts.chunks_exact(CODES);
+        channels.all(|counts| {
+            let sum = counts.iter().try_fold(0, |sum: u64, n| sum.checked_add(*n));
+            sum == Some(pixels)
+        })
+    }
+
     fn statistics(&self, saturated_from: [u32; CHANNELS]) -> CodeStatistics {
         let channels = self.counts.chunks_exact(CODES);
         let mut statistics = CodeStatistics::of_photograph();
@@ -178,6 +197,7 @@ mod tests {
                     expected.add_row(row, saturated_from);
                 }
                 let stored = CodeHistogram::decompress(&histogram.compress().unwrap()).unwrap();
+                assert!(stored.is_of(count.into()) && !stored.is_of(u64::from(count) + 1));
                 assert_eq!(stored.statistics(saturated_from), expected);
             }
         }

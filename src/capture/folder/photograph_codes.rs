@@ -57,8 +57,8 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
         }
     }
 
-    /// Makes row `y`, which must not lie above, the next one without reading those between. False if the file has to be read
-    /// whole, as nothing else says the statistics of its codes.
+    /// Makes row `y`, which must not lie above, the next one without reading those between, in a file whose record has the
+    /// statistics of all codes. False in other files, whose rows must all be read.
     pub fn skip_to(&mut self, y: u32) -> bool {
         match self {
             Self::Png(_) => false,
@@ -67,7 +67,7 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
         }
     }
 
-    /// Frees what is in memory of rows that were read.
+    /// Frees the memory of rows that were decoded.
     pub fn release(&mut self) {
         #[cfg(not(target_arch = "wasm32"))]
         if let Self::Tiff(reader) = self {
@@ -75,8 +75,8 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
         }
     }
 
-    /// The statistics that the file says of its own codes, if codes from `saturated_from` on are saturated. Otherwise checks
-    /// the rest of the file, once all rows are read.
+    /// The statistics of all codes by the record of an ingested photograph, if codes from `saturated_from` on are saturated.
+    /// `None` of other files, of which it checks what follows the last row.
     pub fn finish(
         self,
         saturated_from: [u32; CHANNELS],

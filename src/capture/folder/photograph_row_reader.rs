@@ -61,7 +61,13 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
         Ok((photo, self.finish()?))
     }
 
-    /// Returns the statistics of the photograph's codes. Reads the rest of the file, unless that says them.
+    /// Frees the memory of rows that were decoded, until the next are read.
+    pub fn release(&mut self) {
+        self.codes.release();
+    }
+
+    /// Returns the statistics of the photograph's codes: by the record of an ingested photograph, otherwise from the rest of the
+    /// rows, which it reads.
     ///
     /// # Errors
     /// If the file is damaged or ends early.
@@ -115,6 +121,5 @@ pub(super) fn read_rows<F: CaptureFiles>(
         add(*next_row, row);
         *next_row += 1;
     }
-    codes.release();
     Ok(())
 }

@@ -1,17 +1,13 @@
 //! TIFF photographs: 16-bit linear RGB, in strips. With the record of [`IngestRecord`], rows are read without the others.
 
-use std::io::{BufReader, Seek, Write};
+use std::io::BufReader;
 
 use tiff::decoder::{ChunkType, Decoder, Limits};
-use tiff::encoder::colortype::RGB16;
-use tiff::encoder::{TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard};
 use tiff::tags::{PlanarConfiguration, SampleFormat, Tag};
 use tiff::{ColorType, TiffError, TiffResult};
 
 use super::files::{CaptureFile, CaptureFiles};
-use super::ingest::IngestError;
-use super::ingest_record::{CodeHistogram, IngestRecord, IngestSource};
-use super::photograph_codes::PhotographCodes;
+use super::ingest_record::IngestRecord;
 use super::picture_file::PictureFile;
 use crate::capture::code_statistics::CodeStatistics;
 use crate::capture::error::{CaptureError, CaptureErrorKind};
@@ -19,16 +15,11 @@ use crate::transport::{CHANNELS, Extent};
 
 /// The first bytes of a TIFF; BigTIFF has 43 (+) instead of 42 (*).
 const SIGNATURES: [&[u8]; 4] = [b"II*\0", b"II+\0", b"MM\0*", b"MM\0+"];
-/// Bytes read at a time for a tag; strips are read whole.
+/// Bytes read from a file at a time, and for a tag: uncompressed strips are read whole.
+const READ_BYTES: usize = 1 << 16;
 pub(super) const TAG_BYTES: usize = 1 << 10;
-/// Rows of a strip that this program writes.
-const STRIP_ROWS: u32 = 16;
 /// Largest strip that is read: as many are in memory as photographs are read at once.
 pub(super) const MAX_STRIP_BYTES: usize = 8 << 20;
-/// Largest strip that is read to write smaller ones.
-const MAX_INGESTED_STRIP_BYTES: usize = 2 << 30;
-/// Bytes of samples from which on offsets do not fit in 32 bits, with space for the rest of the file.
-const BIG_TIFF_BYTES: u64 = 0xF000_0000;
 
 /// Whether a file that begins with these bytes is a TIFF.
 pub(super) fn is_tiff(start: &[u8]) -> bool {
@@ -52,10 +43,6 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
     pub fn open_within(file: PictureFile<'a, F>, max_bytes: usize) -> Result<Self, CaptureError> {
         let source = BufReader::with_capacity(TAG_BYTES, file.open()?);
         let mut decoder = Decoder::new(source).map_err(|e| unreadable(&file, e))?;
-        let mut limits = Limits::default();
-        limits.decoding_buffer_size = max_bytes;
-        limits.intermediate_buffer_size = max_bytes;
-        decoder = decoder.with_limits(limits);
         let layout = Layout::read(&mut decoder).map_err(|e| unreadable(&file, e))?;
         file.check_extent(layout.extent)?;
         if layout.extent.area() == 0 {
@@ -64,6 +51,15 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
         }
         layout.check(max_bytes).map_err(|e| file.error(e))?;
         let record = IngestRecord::read(&mut decoder).map_err(|e| unreadable(&file, e))?;
+        if record.is_none() {
+            // Compressed strips are read in as many bytes.
+            let source = BufReader::with_capacity(READ_BYTES, file.open()?);
+            decoder = Decoder::new(source).map_err(|e| unreadable(&file, e))?;
+        }
+        // Strips are within `max_bytes`; of compressed ones, the compressed bytes are in memory as well.
+        let mut limits = Limits::default();
+        limits.intermediate_buffer_size = limits.intermediate_buffer_size.max(2 * max_bytes);
+        decoder = decoder.with_limits(limits);
         Ok(Self {
             extent: layout.extent,
             strip_rows: layout.strip_rows,
@@ -121,7 +117,7 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
         Ok(())
     }
 
-    /// See [`PhotographCodes::skip_to`].
+    /// See [`PhotographCodes::skip_to`](super::photograph_codes::PhotographCodes::skip_to).
     pub fn skip_to(&mut self, y: u32) -> bool {
         if self.record.is_some() {
             self.next_row = y;
@@ -223,49 +219,6 @@ fn unreadable<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> C
     })
 }
 
-/// Writes a photograph, whose file is `source`, as an uncompressed TIFF of strips with their record.
-pub(super) fn write<F: CaptureFiles>(
-    photograph: PictureFile<'_, F>,
-    source: &IngestSource,
-    out: impl Write + Seek,
-) -> Result<(), IngestError> {
-    let photograph = PhotographCodes::open_within(photograph, MAX_INGESTED_STRIP_BYTES)?;
-    let extent = photograph.extent();
-    let bytes = size_of::<[u16; CHANNELS]>() as u64 * extent.area() as u64;
-    match bytes < BIG_TIFF_BYTES {
-        true => write_kind::<F, _, TiffKindStandard>(photograph, source, out),
-        false => write_kind::<F, _, TiffKindBig>(photograph, source, out),
-    }
-}
-
-fn write_kind<F: CaptureFiles, W: Write + Seek, K: TiffKind>(
-    mut photograph: PhotographCodes<'_, F>,
-    source: &IngestSource,
-    out: W,
-) -> Result<(), IngestError> {
-    let Extent { width, height } = photograph.extent();
-    let mut encoder = TiffEncoder::<W, K>::new_generic(out)?;
-    let mut image = encoder.new_image::<RGB16>(width, height)?;
-    image.rows_per_strip(STRIP_ROWS.min(height))?;
-    let (mut checksums, mut histogram) = (Vec::new(), CodeHistogram::empty());
-    let mut strip: Vec<[u16; CHANNELS]> = Vec::new();
-    for y in 0..height {
-        if let Some(row) = photograph.next()? {
-            strip.extend_from_slice(row);
-        }
-        if (y + 1) % STRIP_ROWS == 0 || y + 1 == height {
-            let samples = strip.as_flattened();
-            image.write_strip(samples)?;
-            checksums.push(crc32c::crc32c(bytemuck::cast_slice(samples)));
-            histogram.add(&strip);
-            strip.clear();
-        }
-    }
-    photograph.finish([u32::MAX; CHANNELS])?;
-    IngestRecord::write(image.encoder(), source, checksums, &histogram)?;
-    Ok(image.finish()?)
-}
-
 #[cfg(test)]
 mod tests {
     use std::cell::Cell;
@@ -273,10 +226,12 @@ mod tests {
     use std::io::{self, Cursor};
     use std::path::PathBuf;
 
-    use tiff::encoder::colortype::{ColorType, Gray16, RGB8, RGB32Float, RGBA16};
-    use tiff::encoder::{Compression, TiffValue};
+    use tiff::encoder::colortype::{ColorType, Gray16, RGB8, RGB16, RGB32Float, RGBA16};
+    use tiff::encoder::{Compression, TiffEncoder, TiffKindBig, TiffValue};
 
+    use super::super::ingest;
     use super::*;
+    use crate::capture::IngestSource;
     use crate::capture::camera_pixel_set::CameraPixelSet;
     use crate::capture::camera_row_set::CameraRowSet;
     use crate::capture::{CaptureFolder, Manifest};
@@ -402,6 +357,17 @@ mod tests {
                 assert!(read_all(&capture) == expected, "{strip_rows} rows");
                 let again = self::capture("a.tif", ingested(&capture));
                 assert!(read_all(&again) == expected);
+                let mut big = Cursor::new(Vec::new());
+                let listed = capture.listed(capture.manifest().photographs()[0]);
+                ingest::write::<_, _, TiffKindBig>(
+                    listed.open_codes().unwrap(),
+                    &source(),
+                    &mut big,
+                )
+                .unwrap();
+                let big = big.into_inner();
+                assert_eq!(&big[..4], b"II+\0");
+                assert!(read_all(&self::capture("a.tif", big)) == expected);
             }
         }
     }

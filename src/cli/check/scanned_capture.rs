@@ -14,7 +14,7 @@ use crate::cli::progress;
 use crate::cli::recover::capture_sample::{CaptureSample, PhotographSource};
 use crate::job_executor::{Cancelled, Executor};
 use crate::recover::{Method, preparation_pixels};
-use crate::transport::{CHANNELS, Correspondence, TileRect, Window};
+use crate::transport::{CHANNELS, CameraPixel, Correspondence, TileRect, Window};
 
 /// Memory for shots that are loaded whole, and for the sampled rows of the Gray code.
 const WHOLE_SHOTS_BYTES: usize = 560 << 20;
@@ -38,6 +38,8 @@ pub struct ScannedCapture<'a> {
 
 /// The camera pixels whose codes are kept.
 struct SampledPixels {
+    /// Those that the noise floor is estimated from, as the recovery does.
+    noise: CameraPixelSet,
     shots: CameraPixelSet,
     /// Whole rows.
     gray_code: CameraPixelSet,
@@ -50,10 +52,11 @@ impl SampledPixels {
         let camera = manifest.camera.extent();
         let bytes = |photographs: usize| (photographs * PIXEL_BYTES).max(1);
         let is_small = camera.area() * bytes(manifest.shots.len() + 1) <= WHOLE_SHOTS_BYTES;
+        // The fallback reads more than least squares.
+        let prepared = preparation_pixels(camera, Method::Learned, window);
         let shots = match is_small {
             true => CameraPixelSet::all(camera),
-            // The fallback reads more than least squares.
-            false => preparation_pixels(camera, Method::Learned, window),
+            false => prepared.clone(),
         };
         let row_bytes = bytes(manifest.graycode.len()) * camera.width as usize;
         let max_rows = (GRAY_CODE_BYTES / row_bytes).max(1);
@@ -63,6 +66,7 @@ impl SampledPixels {
         let rects: Vec<TileRect> = shots.rects().chain(gray_code.rects()).collect();
         Self {
             dark: CameraPixelSet::union(camera, &rects),
+            noise: prepared,
             shots,
             gray_code,
         }
@@ -171,7 +175,20 @@ impl<'a> ScannedCapture<'a> {
         let camera = &manifest.camera;
         let dark = self.dark_of(PhotographRole::Flood, camera);
         let code = (camera.white - camera.black).recip();
-        let noise = NoiseModel::from_dark_rows(&self.sampled.shots.split(&dark), code);
+        let spans: Vec<&[[f32; CHANNELS]]> = self
+            .sampled
+            .noise
+            .rects()
+            .filter_map(|span| {
+                let pixel = CameraPixel {
+                    x: span.x,
+                    y: span.y,
+                };
+                let first = self.sampled.shots.index_of(pixel)?;
+                dark.get(first..first + span.extent.area())
+            })
+            .collect();
+        let noise = NoiseModel::from_dark_rows(spans.into_iter(), code);
         let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
         let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
         let declared = manifest.correspondence.as_ref();

@@ -71,7 +71,9 @@ impl SampleSource<'_> {
         let dark = folder.read_dark(pixels)?;
         let flood = folder.open_flood()?;
         let gray_code_rows = self.plan.gray_code_rows();
-        let mut measurements = read_patterns(&folder, dark.noise(), &shots, gray_code_rows)?;
+        // The same whether all pixels are loaded or not.
+        let noise = dark.noise(self.plan.prepared());
+        let mut measurements = read_patterns(&folder, noise, &shots, gray_code_rows)?;
         let reader = MeasurementReader::open(&folder, &shots)?;
         opened()?;
         let mut read = reader.read_sample(&mut measurements, &dark, pixels, self.cores)?;

@@ -141,7 +141,9 @@ impl TileRecovery<'_> {
             if let Some((reader, dark)) = &mut reader {
                 let check = || Ok(cores.check_cancelled()?);
                 let pixels = CameraPixelSet::row_range(rows.clone(), geometry.camera.width);
-                reader.load(&mut measurements, &dark.read(&pixels)?, &pixels, check)?;
+                let dark_rows = dark.read(&pixels)?;
+                dark.release();
+                reader.load(&mut measurements, &dark_rows, &pixels, check)?;
                 // Rows that were loaded before are filled already, and those above and below the shard are counted by others.
                 let [start, end] = own_rows.map(|row| row.clamp(next_row, rows.end.max(next_row)));
                 reader.fill_defects(&mut measurements, next_row..start, codes);

@@ -1,18 +1,21 @@
-//! `ltm-export stage ingest`: a copy of a capture whose photographs are TIFFs, of which each stage reads its rows only.
+//! `ltm-export stage ingest`: copies a capture. The photographs of the copy are TIFFs, whose rows can be read one by one.
 //!
-//! Every photograph has one source and one target, so that shards share nothing; whichever shard ends last writes the manifest.
+//! A shard writes every Nth file; the shard that ends last writes the manifest.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
+use std::time::SystemTime;
 
 use anyhow::{Context, Error, Result, bail, ensure};
 use rayon::prelude::*;
 
 use super::shard::Shard;
+use super::stage_folder::StageFileProblem;
 use crate::capture::{
-    CaptureFolder, IngestError, IngestSource, IngestedPhotograph, ListedPhotograph, MANIFEST_NAME,
+    CaptureError, CaptureErrorKind, CaptureFolder, IngestError, IngestSource, IngestedPhotograph,
+    ListedPhotograph, MANIFEST_NAME,
 };
 use crate::cli::file_hash::hash_file;
 use crate::cli::ingested_manifest::{SOURCE_MANIFEST, ingested_manifest, is_of_source, tiff_name};
@@ -34,6 +37,23 @@ pub struct Ingestion<'a> {
     files: BTreeMap<String, IngestedFile<'a>>,
 }
 
+/// A name in a manifest for which the copy has no file.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: \"{name}\" {fault}", manifest.display())]
+pub struct IngestNameError {
+    manifest: PathBuf,
+    name: String,
+    fault: NameFault,
+}
+
+#[derive(Debug, thiserror::Error)]
+enum NameFault {
+    #[error("is outside the folder; move the file into it")]
+    Outside,
+    #[error("and \"{0}\" would have one name as TIFFs; rename one of them")]
+    Shared(String),
+}
+
 /// A file of the capture.
 #[derive(Clone, Copy)]
 struct IngestedFile<'a> {
@@ -42,14 +62,14 @@ struct IngestedFile<'a> {
     photograph: Option<ListedPhotograph<'a>>,
 }
 
-/// What a shard did.
+/// Numbers of files: photographs, patterns and the shooting log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IngestCounts {
-    /// Photographs and patterns that were written.
+    /// Written by this shard.
     pub written: usize,
-    /// Those that were there.
+    /// Of this shard, there already.
     pub complete: usize,
-    /// Those that other shards have not written yet; there is no manifest until none are.
+    /// Of other shards, not there yet. The manifest is written once there are none.
     pub missing: usize,
 }
 
@@ -64,29 +84,23 @@ impl<'a> Ingestion<'a> {
         let copies = patterns.map(|shot| (shot.pattern.as_str(), None));
         let log = capture.root().join(LOG_NAME).exists();
         let log = log.then_some((LOG_NAME, None));
-        let mut files = BTreeMap::new();
+        let mut files: BTreeMap<String, IngestedFile<'_>> = BTreeMap::new();
         for (name, photograph) in photographs.chain(copies).chain(log) {
-            let is_inside = |component| matches!(component, Component::Normal(_));
-            ensure!(
-                Path::new(name).components().all(is_inside),
-                "{}: \"{name}\" is outside the folder; move the file into it first",
-                capture.manifest_path().display()
-            );
-            let target = match photograph {
-                Some(_) => tiff_name(name),
-                None => name.to_owned(),
+            let unusable = |fault| IngestNameError {
+                manifest: capture.manifest_path(),
+                name: name.to_owned(),
+                fault,
             };
-            let file = IngestedFile { name, photograph };
-            if let Some(other) = files
-                .insert(target, file)
-                .filter(|other| other.name != name)
-            {
-                bail!(
-                    "{}: \"{}\" and \"{name}\" would have one name as TIFFs; rename one of them",
-                    capture.manifest_path().display(),
-                    other.name
-                );
+            let path = path_inside(name).ok_or_else(|| unusable(NameFault::Outside))?;
+            let target = match photograph {
+                Some(_) => tiff_name(&path),
+                None => path.clone(),
+            };
+            let other = files.get(&target).map(|file| file.name.to_owned());
+            if let Some(other) = other.filter(|other| path_inside(other) != Some(path)) {
+                bail!(unusable(NameFault::Shared(other)));
             }
+            files.insert(target, IngestedFile { name, photograph });
         }
         Ok(Self {
             capture,
@@ -100,7 +114,7 @@ impl<'a> Ingestion<'a> {
     /// # Errors
     /// If a file cannot be read or written, if the output folder has other files, and if the executor is cancelled.
     pub fn run(&self, shard: Shard, cores: &InterruptibleCores) -> Result<IngestCounts> {
-        let manifest = IngestedManifest::of(self.capture)?;
+        let manifest = CopyManifest::of(self.capture)?;
         claim_folder(self.capture, self.output)?;
         write_text(&self.output.join(SOURCE_MANIFEST), &manifest.source)?;
         let path = self.output.join(MANIFEST_NAME);
@@ -136,27 +150,44 @@ impl<'a> Ingestion<'a> {
             self.capture.root().join(file.name),
             self.output.join(target),
         );
+        let field = file.photograph.map(|photograph| photograph.role.field());
+        let before = modified(&from).map_err(|error| CaptureError { field, ..error })?;
         let folder = to.parent().unwrap_or(self.output);
         fs::create_dir_all(folder).with_context(|| {
             let folder = folder.display();
             format!("{folder}: cannot be created; may you write there?")
         })?;
-        // Of a capture that was ingested, the record stays.
+        // A photograph that was ingested keeps its record.
         let is_ingested = ingested(&from)?.is_some();
-        let Some(photograph) = file.photograph.filter(|_| !is_ingested) else {
-            return self.copy(&from, &to);
+        let is_written = match file.photograph.filter(|_| !is_ingested) {
+            Some(photograph) => self.write_photograph(photograph, &from, &to)?,
+            None => self.copy(&from, &to)?,
         };
-        let hashed = hash_file(&from, file.name.to_owned())?;
+        if is_written && modified(&from)? != before {
+            remove_if_there(&to)?;
+            return Err(StageFileProblem::ChangedWhileRead.of(&from).into());
+        }
+        Ok(is_written)
+    }
+
+    /// Writes a photograph as TIFF, unless the TIFF of an equal file is there.
+    fn write_photograph(
+        &self,
+        photograph: ListedPhotograph<'_>,
+        from: &Path,
+        to: &Path,
+    ) -> Result<bool> {
+        let hashed = hash_file(from, photograph.name.to_owned())?;
         let source = IngestSource {
             name: hashed.path,
             bytes: hashed.bytes,
             sha256: hashed.sha256,
         };
-        if to.exists() && ingested(&to)?.is_some_and(|there| there.source == source) {
+        if to.exists() && ingested(to)?.is_some_and(|there| there.source == source) {
             return Ok(false);
         }
         self.remove_manifest()?;
-        let output = OutputFile::create(&to, &PHOTOGRAPH)?;
+        let output = OutputFile::create(to, &PHOTOGRAPH)?;
         output.finish_from_input(|out| {
             let ingest = self.capture.ingest(photograph, &source, out);
             ingest.map_err(|error| match error {
@@ -167,18 +198,21 @@ impl<'a> Ingestion<'a> {
         Ok(true)
     }
 
-    /// Whether a shard has written a file, of a source as long as the present one.
+    /// Whether there is a file of the copy, made from a file as long as the present one.
     fn is_there(&self, target: &str, file: IngestedFile<'_>) -> bool {
-        let length = |path: PathBuf| path.metadata().ok().map(|file| file.len());
+        let length = |path: &Path| path.metadata().ok().map(|file| file.len());
         let (from, to) = (
             self.capture.root().join(file.name),
             self.output.join(target),
         );
-        match IngestedPhotograph::read(&to) {
-            Ok(Some(there)) if there.source.name == file.name => {
-                length(from) == Some(there.source.bytes)
-            }
-            _ => length(to).is_some_and(|bytes| length(from) == Some(bytes)),
+        let record = |path: &Path| IngestedPhotograph::read(path).ok().flatten();
+        match (file.photograph, record(&to)) {
+            (None, _) => length(&to).is_some_and(|bytes| length(&from) == Some(bytes)),
+            (Some(_), None) => false,
+            (Some(_), Some(there)) => match record(&from) {
+                Some(original) => original == there,
+                None => there.source.name == file.name && length(&from) == Some(there.source.bytes),
+            },
         }
     }
 
@@ -189,7 +223,7 @@ impl<'a> Ingestion<'a> {
             return Ok(false);
         }
         self.remove_manifest()?;
-        let mut source = File::open(from).with_context(|| from.display().to_string())?;
+        let mut source = File::open(from).map_err(|e| read_error(from, e))?;
         let output = OutputFile::create(to, &COPY)?;
         output.finish(|out| Ok(io::copy(&mut source, out).map(drop)?))?;
         Ok(true)
@@ -201,15 +235,15 @@ impl<'a> Ingestion<'a> {
     }
 }
 
-/// The manifests of a copy.
-struct IngestedManifest {
-    /// As it is in the folder that was ingested first.
+/// The manifest of a copy.
+struct CopyManifest {
+    /// The text of the source.
     source: String,
     /// With the names of the TIFFs.
     text: String,
 }
 
-impl IngestedManifest {
+impl CopyManifest {
     fn of(capture: &CaptureFolder) -> Result<Self> {
         let read =
             |path: &Path| fs::read_to_string(path).with_context(|| path.display().to_string());
@@ -267,6 +301,36 @@ fn write_text(path: &Path, text: &str) -> Result<()> {
 
 fn ingested(path: &Path) -> Result<Option<IngestedPhotograph>> {
     IngestedPhotograph::read(path).with_context(|| path.display().to_string())
+}
+
+/// When a file of the capture was changed, and its length.
+fn modified(path: &Path) -> Result<(SystemTime, u64), CaptureError> {
+    let metadata = path.metadata();
+    let read = metadata.and_then(|metadata| Ok((metadata.modified()?, metadata.len())));
+    read.map_err(|e| read_error(path, e))
+}
+
+fn read_error(path: &Path, error: io::Error) -> CaptureError {
+    CaptureError::new(
+        path,
+        match error.kind() {
+            io::ErrorKind::NotFound => CaptureErrorKind::Missing,
+            _ => CaptureErrorKind::Io(error),
+        },
+    )
+}
+
+/// A path relative to a folder, without `.` and doubled separators; `None` if it leads out of the folder.
+fn path_inside(name: &str) -> Option<String> {
+    let mut parts = Vec::new();
+    for component in Path::new(name).components() {
+        match component {
+            Component::CurDir => {}
+            Component::Normal(part) => parts.push(part.to_str()?),
+            _ => return None,
+        }
+    }
+    Some(parts.join("/"))
 }
 
 fn remove_if_there(path: &Path) -> Result<()> {

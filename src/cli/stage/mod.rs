@@ -25,6 +25,7 @@ use std::time::Instant;
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
+pub use self::ingest::IngestNameError;
 pub use self::stage_folder::StageFileError;
 
 use self::ingest::Ingestion;
@@ -67,7 +68,7 @@ enum Stage {
     Assemble(AssembleArgs),
 }
 
-/// Copy a capture with photographs as TIFFs, of which stages read only the rows they need
+/// Copy a capture; the photographs become TIFFs, of which the other stages read only the rows they need
 #[derive(Debug, Args)]
 struct IngestArgs {
     /// Capture folder: capture.json and the files it names
@@ -75,7 +76,7 @@ struct IngestArgs {
     /// Folder of the copy; created if missing
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
-    /// Which of how many parts of the files: 1/16 to 16/16. The last that ends writes capture.json
+    /// Which of how many shards of the files: 1/16 to 16/16. The shard that ends last writes capture.json
     #[arg(long, value_name = "I/N", default_value = "1/1", value_parser = Shard::parse)]
     shard: Shard,
 }

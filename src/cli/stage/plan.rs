@@ -26,7 +26,7 @@ const PLAN: FileSignature = FileSignature::of_own_name("a plan");
 pub enum Comparison {
     /// Its manifest, the records of photographs that were ingested, and the lengths of its other files.
     Records,
-    /// All files whole.
+    /// All files whole; of photographs that were ingested, the records.
     Contents,
 }
 
@@ -45,7 +45,7 @@ pub struct RecoveryPlan {
 }
 
 impl RecoveryPlan {
-    /// Plans a recovery. Reads all its files.
+    /// Plans a recovery. Reads all its files; of photographs that were ingested, the records.
     ///
     /// # Errors
     /// If one cannot be read, and if the executor is cancelled.

@@ -31,6 +31,8 @@ pub enum StageFileProblem {
         "was replaced while a shard was recovered from it; the same command recovers the shard again"
     )]
     Replaced,
+    #[error("was changed while it was read; the same command reads it again")]
+    ChangedWhileRead,
     #[error("was written by {0}, and this is {PROGRAM}; use one version for all stages")]
     OtherProgram(String),
     #[error("{0} has changed since; \"ltm-export stage plan\" plans the recovery anew")]
@@ -41,8 +43,8 @@ impl StageFileError {
     /// Whether the same command may succeed later: once another stage has written the file, or with the file that is there
     /// now.
     pub fn may_pass(&self) -> bool {
-        use StageFileProblem::{Missing, Replaced};
-        matches!(self.problem, Missing(_) | Replaced)
+        use StageFileProblem::{ChangedWhileRead, Missing, Replaced};
+        matches!(self.problem, ChangedWhileRead | Missing(_) | Replaced)
     }
 }
 

@@ -66,8 +66,8 @@ impl CaptureReader {
         };
         let patterns = shots.iter().map(|&i| folder.read_pattern(i));
         let patterns = patterns.collect::<Result<_, _>>()?;
-        let measurements =
-            folder.empty_measurements(&shots, patterns, correspondence, dark.noise());
+        let noise = dark.noise(&CameraPixelSet::all(manifest.camera.extent()));
+        let measurements = folder.empty_measurements(&shots, patterns, correspondence, noise);
         let provenance = Provenance::new(manifest, &shots);
         postcard::to_allocvec(&(measurements, provenance)).map_err(|_| out_of_memory())
     }
