@@ -591,7 +591,7 @@ class SlurmTest(WorkflowTest):
         """Its daemon, the job's daemon and the job are killed: the shard continues on the other node."""
         running = self.shard_on_a_node()
         self.slurm.kill_node(running.node)
-        for pid in (*processes(f"slurmstepd: [{running.tiles}"), *running.pids()):
+        for pid in (*processes(f"slurmstepd: [{running.job}."), *running.pids()):
             os.kill(pid, signal.SIGKILL)
         self.await_success(running.assemble)
         self.assertIn("resuming with", running.log())
@@ -628,11 +628,12 @@ class SlurmTest(WorkflowTest):
         folder = self.folder / f"{self.id().split('.')[-1]}-files"
         folder.mkdir()
         running = RunningShard(folder)
-        *_, running.tiles, running.assemble = self.submit_array(running.capture, running.file, 2)
+        *_, tiles, running.assemble = self.submit_array(running.capture, running.file, 2)
         partial = running.stages / "shards"
         wait_until(lambda: any(path.stat().st_size > 20_000 for path in partial.glob("1-of-2.*.partial")), SECONDS)
-        name = subprocess.run(["squeue", "-h", "-j", f"{running.tiles}_1", "-o", "%N"], capture_output=True, text=True)
-        running.node = name.stdout.strip()
+        # Each shard is a job of its own, with a node.
+        question = ["squeue", "-h", "-j", f"{tiles}_1", "-o", "%A %N"]
+        running.job, running.node = subprocess.run(question, capture_output=True, text=True).stdout.split()
         return running
 
 
@@ -643,7 +644,7 @@ class RunningShard:
         self.capture, self.file = folder / "large", folder / "large.ltm"
         simulate(self.capture, 1, "256x256")
         self.stages = folder / "large-stages"
-        self.node = self.tiles = self.assemble = None
+        self.node = self.job = self.assemble = None
         recovered = folder / "recovered.ltm"
         ltm_export("recover", self.capture, "-o", recovered, *OPTIONS.split())
         self.expected = recovered.read_bytes()
