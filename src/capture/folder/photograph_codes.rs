@@ -59,6 +59,10 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
 
     /// Makes row `y`, which must not lie above, the next one without reading those between, in a file whose record has the
     /// statistics of all codes. False in other files, whose rows must all be read.
+    #[cfg_attr(
+        target_arch = "wasm32",
+        expect(unused_variables, reason = "of TIFF only")
+    )]
     pub fn skip_to(&mut self, y: u32) -> bool {
         match self {
             Self::Png(_) => false,
@@ -77,6 +81,10 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
 
     /// The statistics of all codes by the record of an ingested photograph, if codes from `saturated_from` on are saturated.
     /// `None` of other files, of which it checks what follows the last row.
+    #[cfg_attr(
+        target_arch = "wasm32",
+        expect(unused_variables, reason = "of TIFF only")
+    )]
     pub fn finish(
         self,
         saturated_from: [u32; CHANNELS],
