@@ -121,8 +121,8 @@ impl<'a> MeasurementReader<'a> {
         measurements.fill_defective_pixels(rows, f64::from(codes.step()) * self.code)
     }
 
-    /// Loads `pixels`, estimates the noise from them, and reads the rest of the files that do not say the statistics of their
-    /// codes, which checks that they are whole.
+    /// Loads `pixels`, estimates the gain of the noise from them, and reads the rest of the files without a record, which checks
+    /// that they are whole.
     pub fn read_sample(
         mut self,
         measurements: &mut Measurements,

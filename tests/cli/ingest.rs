@@ -135,6 +135,7 @@ fn files_of_others_are_not_replaced() {
     for (name, words) in [
         ("photos/0003.jpg", "would have one name as TIFFs"),
         ("../0004.png", "\"../0004.png\" is outside the folder"),
+        (".", "\".\" is outside the folder"),
     ] {
         fs::write(&manifest, json.replace("photos/0004.png", name)).unwrap();
         fails(&ingest(capture, &copy), 65, &["capture.json", words]);
@@ -142,7 +143,10 @@ fn files_of_others_are_not_replaced() {
     // A file may be named in several ways.
     let again = json.replacen("photos/0003.png", "./photos//0004.png", 1);
     fs::write(&manifest, again).unwrap();
-    succeeds(&ingest(capture, &job.path("named")));
+    let named = job.path("named");
+    succeeds(&ingest(capture, &named));
+    let stages = job.path("named-stages");
+    succeeds(&["stage", "plan", text(&named), "-o", text(&stages)]);
     fs::write(&manifest, &json).unwrap();
     // A damaged photograph is told, and the manifest waits for it.
     let photo = capture.join("photos/0004.png");
@@ -156,6 +160,13 @@ fn files_of_others_are_not_replaced() {
     assert!(!copy.join("capture.json").exists());
     assert!(!copy.join("photos/0004.tif").exists());
     fs::remove_file(&photo).unwrap();
+    fs::create_dir(&photo).unwrap();
+    fails(
+        &ingest(capture, &copy),
+        65,
+        &["photos/0004.png", "directory"],
+    );
+    fs::remove_dir(&photo).unwrap();
     let missing = ["photos/0004.png (shots[4].photo", "there is no such file"];
     fails(&ingest(capture, &copy), 65, &missing);
     fs::write(&photo, &bytes).unwrap();

@@ -141,7 +141,7 @@ impl CodeHistogram {
         }
     }
 
-    /// Whether each channel has so many samples.
+    /// Whether each channel has `pixels` samples.
     fn is_of(&self, pixels: u64) -> bool {
         let mut channels = self.counts.chunks_exact(CODES);
         channels.all(|counts| {

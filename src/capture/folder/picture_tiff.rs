@@ -15,8 +15,9 @@ use crate::transport::{CHANNELS, Extent};
 
 /// The first bytes of a TIFF; BigTIFF has 43 (+) instead of 42 (*).
 const SIGNATURES: [&[u8]; 4] = [b"II*\0", b"II+\0", b"MM\0*", b"MM\0+"];
-/// Bytes read from a file at a time, and for a tag: uncompressed strips are read whole.
+/// Bytes that are read from a file at a time.
 const READ_BYTES: usize = 1 << 16;
+/// Bytes that are read for a tag: uncompressed strips do not go through the buffer.
 pub(super) const TAG_BYTES: usize = 1 << 10;
 /// Largest strip that is read: as many are in memory as photographs are read at once.
 pub(super) const MAX_STRIP_BYTES: usize = 8 << 20;
@@ -52,11 +53,11 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
         layout.check(max_bytes).map_err(|e| file.error(e))?;
         let record = IngestRecord::read(&mut decoder).map_err(|e| unreadable(&file, e))?;
         if record.is_none() {
-            // Compressed strips are read in as many bytes.
+            // The decompressor reads through the buffer.
             let source = BufReader::with_capacity(READ_BYTES, file.open()?);
             decoder = Decoder::new(source).map_err(|e| unreadable(&file, e))?;
         }
-        // Strips are within `max_bytes`; of compressed ones, the compressed bytes are in memory as well.
+        // Refuses strips whose compressed size is more than twice the largest decoded one.
         let mut limits = Limits::default();
         limits.intermediate_buffer_size = limits.intermediate_buffer_size.max(2 * max_bytes);
         decoder = decoder.with_limits(limits);
@@ -151,6 +152,8 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
 struct Layout {
     extent: Extent,
     color: ColorType,
+    /// Samples of a pixel, with those that are no colour.
+    samples: u16,
     is_integer: bool,
     is_tiled: bool,
     is_planar: bool,
@@ -167,6 +170,9 @@ impl Layout {
         Ok(Self {
             extent: Extent::new(width, height),
             color: decoder.colortype()?,
+            samples: decoder
+                .find_tag_unsigned(Tag::SamplesPerPixel)?
+                .unwrap_or(1),
             is_integer: { formats.iter().flatten() }
                 .all(|format| *format == SampleFormat::Uint.to_u16()),
             is_tiled: decoder.get_chunk_type() == ChunkType::Tile,
@@ -192,6 +198,11 @@ impl Layout {
                 _ => "of another colour type",
             };
             let found = format!("{bits}-bit{numbers} {color}");
+            return Err(CaptureErrorKind::PhotoType(found));
+        }
+        // The decoder would leave the others out, after it has undone a predictor with a wrong number of samples.
+        if usize::from(self.samples) != CHANNELS {
+            let found = format!("16-bit RGB with {} samples a pixel", self.samples);
             return Err(CaptureErrorKind::PhotoType(found));
         }
         if self.is_tiled {
@@ -228,6 +239,7 @@ mod tests {
 
     use tiff::encoder::colortype::{ColorType, Gray16, RGB8, RGB16, RGB32Float, RGBA16};
     use tiff::encoder::{Compression, TiffEncoder, TiffKindBig, TiffValue};
+    use tiff::tags::ExtraSamples;
 
     use super::super::ingest;
     use super::*;
@@ -475,6 +487,7 @@ mod tests {
         let large = Layout {
             extent: Extent::new(60_000, 60_000),
             color: tiff::ColorType::RGB(16),
+            samples: 3,
             is_integer: true,
             is_tiled: false,
             is_planar: false,
@@ -482,5 +495,16 @@ mod tests {
         };
         let error = large.check(MAX_STRIP_BYTES).unwrap_err();
         assert!(matches!(error, CaptureErrorKind::LargeStrips(60_000)));
+        // A fourth sample that is no alpha channel.
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file).unwrap();
+        let mut image = encoder.new_image::<RGB16>(WIDTH, HEIGHT).unwrap();
+        image.extra_samples(&[ExtraSamples::Unspecified]).unwrap();
+        image.rows_per_strip(16).unwrap();
+        image.write_data(&vec![0; 4 * area]).unwrap();
+        let four = capture("a.tif", file.into_inner());
+        let error = four.open_shot(0).map(drop).unwrap_err();
+        let expected = "16-bit RGB with 4 samples a pixel";
+        assert!(matches!(&error.problem, CaptureErrorKind::PhotoType(found) if found == expected));
     }
 }

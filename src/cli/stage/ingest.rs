@@ -50,6 +50,8 @@ pub struct IngestNameError {
 enum NameFault {
     #[error("is outside the folder; move the file into it")]
     Outside,
+    #[error("is the name of a manifest; rename the file")]
+    Reserved,
     #[error("and \"{0}\" would have one name as TIFFs; rename one of them")]
     Shared(String),
 }
@@ -96,6 +98,9 @@ impl<'a> Ingestion<'a> {
                 Some(_) => tiff_name(&path),
                 None => path.clone(),
             };
+            if [MANIFEST_NAME, SOURCE_MANIFEST].contains(&target.as_str()) {
+                bail!(unusable(NameFault::Reserved));
+            }
             let other = files.get(&target).map(|file| file.name.to_owned());
             if let Some(other) = other.filter(|other| path_inside(other) != Some(path)) {
                 bail!(unusable(NameFault::Shared(other)));
@@ -158,24 +163,26 @@ impl<'a> Ingestion<'a> {
             format!("{folder}: cannot be created; may you write there?")
         })?;
         // A photograph that was ingested keeps its record.
-        let is_ingested = ingested(&from)?.is_some();
-        let is_written = match file.photograph.filter(|_| !is_ingested) {
-            Some(photograph) => self.write_photograph(photograph, &from, &to)?,
-            None => self.copy(&from, &to)?,
+        let record = IngestedPhotograph::read(&from);
+        let is_ingested = record.map_err(|e| read_error(&from, e))?.is_some();
+        let unchanged = || match modified(&from)? == before {
+            true => Ok(()),
+            false => Err(StageFileProblem::ChangedWhileRead.of(&from).into()),
         };
-        if is_written && modified(&from)? != before {
-            remove_if_there(&to)?;
-            return Err(StageFileProblem::ChangedWhileRead.of(&from).into());
+        match file.photograph.filter(|_| !is_ingested) {
+            Some(photograph) => self.write_photograph(photograph, &from, &to, unchanged),
+            None => self.copy(&from, &to, unchanged),
         }
-        Ok(is_written)
     }
 
-    /// Writes a photograph as TIFF, unless the TIFF of an equal file is there.
+    /// Writes a photograph as TIFF, unless the TIFF of an equal file is there. The TIFF has its name only if the file is
+    /// `unchanged` at its end.
     fn write_photograph(
         &self,
         photograph: ListedPhotograph<'_>,
         from: &Path,
         to: &Path,
+        unchanged: impl Fn() -> Result<()>,
     ) -> Result<bool> {
         let hashed = hash_file(from, photograph.name.to_owned())?;
         let source = IngestSource {
@@ -193,7 +200,8 @@ impl<'a> Ingestion<'a> {
             ingest.map_err(|error| match error {
                 IngestError::Input(error) => InputError(error.into()).into(),
                 other => Error::new(other),
-            })
+            })?;
+            unchanged().map_err(|error| InputError(error).into())
         })?;
         Ok(true)
     }
@@ -217,7 +225,7 @@ impl<'a> Ingestion<'a> {
     }
 
     /// Copies a file, unless an equal one is there.
-    fn copy(&self, from: &Path, to: &Path) -> Result<bool> {
+    fn copy(&self, from: &Path, to: &Path, unchanged: impl Fn() -> Result<()>) -> Result<bool> {
         let hash = |path: &Path| Ok::<_, Error>(hash_file(path, String::new())?.sha256);
         if to.exists() && hash(from)? == hash(to)? {
             return Ok(false);
@@ -225,7 +233,10 @@ impl<'a> Ingestion<'a> {
         self.remove_manifest()?;
         let mut source = File::open(from).map_err(|e| read_error(from, e))?;
         let output = OutputFile::create(to, &COPY)?;
-        output.finish(|out| Ok(io::copy(&mut source, out).map(drop)?))?;
+        output.finish_from_input(|out| {
+            io::copy(&mut source, out)?;
+            unchanged().map_err(|error| InputError(error).into())
+        })?;
         Ok(true)
     }
 
@@ -330,7 +341,7 @@ fn path_inside(name: &str) -> Option<String> {
             _ => return None,
         }
     }
-    Some(parts.join("/"))
+    (!parts.is_empty()).then(|| parts.join("/"))
 }
 
 fn remove_if_there(path: &Path) -> Result<()> {
