@@ -44,6 +44,11 @@ pub mod relight;
 pub mod simulate;
 #[cfg(all(feature = "study", not(target_arch = "wasm32")))]
 pub mod study;
+#[cfg(all(
+    any(feature = "capture", feature = "photo_file"),
+    not(target_arch = "wasm32")
+))]
+mod tiff_signature;
 pub mod transport;
 #[cfg(target_arch = "wasm32")]
 pub mod web;

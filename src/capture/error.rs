@@ -143,6 +143,17 @@ pub enum CaptureErrorKind {
     InvalidTruth(String),
 }
 
+#[cfg(feature = "capture")]
+impl CaptureErrorKind {
+    /// A file that cannot be opened.
+    pub(crate) fn of_opening(error: std::io::Error) -> Self {
+        match error.kind() {
+            std::io::ErrorKind::NotFound => Self::Missing,
+            _ => Self::Io(error),
+        }
+    }
+}
+
 /// Where the manifest names a file, in brackets.
 fn named_by(field: &Option<String>) -> String {
     let name = |field: &String| format!(" ({field} in {MANIFEST_NAME})");

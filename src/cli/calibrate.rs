@@ -16,9 +16,7 @@ use super::process_resources::{Interrupted, InterruptibleCores};
 use super::progress;
 use super::report::{print_json, print_line};
 use crate::calibrate::{GrayCodeFit, ResidualSummary};
-use crate::capture::{
-    CameraPixelSet, CameraRowSet, CaptureFolder, Manifest, ManifestCamera, NoiseModel,
-};
+use crate::capture::{CameraRowSet, CaptureFolder, Manifest, ManifestCamera, NoiseModel};
 use crate::job_executor::Cancelled;
 use crate::transport::{CHANNELS, CameraPixel, Correspondence, Extent};
 
@@ -146,8 +144,7 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     let spinner = progress::spinner("decoding Gray code");
     let camera = manifest.camera.extent();
     let rows = rows(manifest);
-    let pixels = CameraPixelSet::of_rows(rows.clone(), camera.width);
-    let gray_code = folder.read_gray_code(&folder.read_dark(&pixels)?, &rows)?;
+    let gray_code = folder.read_gray_code(&folder.read_dark_rows(&rows)?, &rows)?;
     let fit = gray_code
         .fit(camera)
         .with_context(|| path.display().to_string())?;

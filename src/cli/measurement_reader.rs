@@ -24,12 +24,10 @@ pub fn read_patterns(
     let correspondence = match &folder.manifest().correspondence {
         Some(correspondence) => correspondence.clone(),
         None => {
-            let camera = folder.manifest().camera.extent();
-            let pixels = CameraPixelSet::of_rows(gray_code_rows.clone(), camera.width);
-            let dark = folder.read_dark(&pixels)?;
+            let dark = folder.read_dark_rows(gray_code_rows)?;
             folder
                 .read_gray_code(&dark, gray_code_rows)?
-                .fit(camera)
+                .fit(folder.manifest().camera.extent())
                 .with_context(|| folder.manifest_path().display().to_string())?
                 .correspondence
         }

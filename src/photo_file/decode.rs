@@ -6,6 +6,7 @@ use std::io::{BufRead, Read, Seek, SeekFrom};
 use super::error::PhotoFileError;
 use super::samples::PhotoSamples;
 use super::{openexr, png, tiff};
+use crate::tiff_signature::is_tiff;
 
 /// Bytes that tell the format.
 const SIGNATURE_BYTES: u64 = 8;
@@ -25,11 +26,9 @@ impl PhotoFormat {
     /// The format of a file that begins so.
     pub fn of(signature: &[u8]) -> Option<Self> {
         let begins = |bytes: &[u8]| signature.starts_with(bytes);
-        // BigTIFF has 43 (+) instead of 42 (*).
-        let is_tiff = [b"II*\0", b"II+\0", b"MM\0*", b"MM\0+"];
         if begins(b"\x89PNG\r\n\x1a\n") {
             Some(Self::Png)
-        } else if is_tiff.iter().any(|bytes| begins(*bytes)) {
+        } else if is_tiff(signature) {
             Some(Self::Tiff)
         } else {
             begins(b"\x76\x2f\x31\x01").then_some(Self::OpenExr)

@@ -111,7 +111,7 @@ fn ingesting_again_writes_what_has_changed() {
     let said = said.map(|said| String::from_utf8(said).unwrap()).concat();
     assert!(said.contains(": 1 files written"), "{said}");
     fails(&job.tiles_args("1/1"), 65, &["0001.tif has changed since"]);
-    // What was ingested is copied as it is.
+    // A copy of the copy has the same TIFFs.
     let third = job.path("third");
     succeeds(&ingest(&copy, &third));
     assert!(fs::read(third.join("photos/0001.tif")).unwrap() == fs::read(&photograph).unwrap());

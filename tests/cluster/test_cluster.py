@@ -169,7 +169,7 @@ class KilledDriverTest(WorkflowTest):
         # pkg-scripts/cluster has become Snakemake.
         run.send_signal(signal.SIGKILL)
         run.wait()
-        wait_until(lambda: not commands_on(self.captures), 30)
+        wait_until(lambda: not processes(str(self.captures)), 30)
         finished = {path.name.split(".")[0] for path in self.results.glob("*.result.json")}
         self.assertLess(len(finished), 6)
         ran = {job.split(":")[0] for job in self.workflow("--cores", "2")}
@@ -670,12 +670,6 @@ def processes(text, program=""):
     commands = [(path.parent.name, read_bytes(path)) for path in Path("/proc").glob("[0-9]*/cmdline")]
     commands = [(pid, command) for pid, command in commands if command.startswith(program.encode())]
     return [int(pid) for pid, command in commands if text.encode() in command]
-
-
-def commands_on(folder):
-    """Process ids of commands with this folder in their arguments."""
-    processes = Path("/proc").glob("[0-9]*/cmdline")
-    return [path.parent.name for path in processes if str(folder).encode() in read_bytes(path)]
 
 
 def read_bytes(path):

@@ -26,6 +26,27 @@ pub struct DarkFrame {
 }
 
 impl DarkFrame {
+    /// These `pixels` of a dark frame with this `light`, `[N]`, of the measurements of a `camera`.
+    ///
+    /// # Panics
+    /// If there are not as many.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn new(pixels: CameraPixelSet, light: LinearPhoto, camera: &ManifestCamera) -> Self {
+        assert_eq!(pixels.count(), light.len());
+        Self {
+            pixels,
+            above: 0,
+            light,
+            code: code_of(camera),
+        }
+    }
+
+    /// Its pixels in units of the measurement.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn light(&self) -> &[[f32; CHANNELS]] {
+        &self.light
+    }
+
     /// The columns `span` of row `y`.
     ///
     /// # Panics
@@ -46,6 +67,10 @@ impl DarkFrame {
         let spans: Vec<_> = spans.map(|(y, span)| self.span(y, &span)).collect();
         NoiseModel::from_dark_rows(spans.into_iter(), self.code)
     }
+}
+
+fn code_of(camera: &ManifestCamera) -> f64 {
+    1.0 / (camera.white - camera.black)
 }
 
 /// Reads the rows of the dark frame once, from the top down.
@@ -83,7 +108,7 @@ impl<F: CaptureFiles> DarkFrameReader<'_, F> {
             pixels: pixels.clone(),
             above,
             light,
-            code: 1.0 / (camera.white - camera.black),
+            code: code_of(camera),
         })
     }
 

@@ -14,9 +14,10 @@ use super::CaptureFolder;
 use super::files::CaptureFiles;
 use super::ingest_record::{CodeHistogram, IngestRecord, IngestSource};
 use super::photograph_codes::PhotographCodes;
-use super::picture_tiff::{TAG_BYTES, is_tiff};
+use super::picture_tiff::TAG_BYTES;
 use crate::capture::error::CaptureError;
 use crate::capture::manifest::ListedPhotograph;
+use crate::tiff_signature::is_tiff;
 use crate::transport::{CHANNELS, Extent};
 
 /// Rows of a strip.
@@ -102,6 +103,8 @@ pub(super) fn write<F: CaptureFiles, W: Write + Seek, K: TiffKind>(
 pub struct IngestedPhotograph {
     /// The file that it was made from.
     pub source: IngestSource,
+    /// Its length in bytes.
+    pub bytes: u64,
     /// CRC-32C of the record, which has the checksums of all strips.
     pub checksum: u32,
 }
@@ -119,11 +122,13 @@ impl IngestedPhotograph {
             return Ok(None);
         }
         file.rewind()?;
+        let bytes = file.metadata()?.len();
         let record = Decoder::new(BufReader::with_capacity(TAG_BYTES, file))
             .and_then(|mut decoder| IngestRecord::read(&mut decoder));
         match record {
             Ok(record) => Ok(record.map(|record| Self {
                 source: record.source,
+                bytes,
                 checksum: record.checksum,
             })),
             Err(TiffError::IoError(error)) if error.raw_os_error().is_some() => Err(error),

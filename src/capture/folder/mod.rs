@@ -246,8 +246,7 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         let field = format!("graycode[{i}].photo");
         let mut reader = self.open_photo(&self.manifest.graycode[i].photo, field, 1.0)?;
         let mut photo = LinearPhoto::new();
-        let pixels = CameraPixelSet::of_rows(rows.clone(), self.manifest.camera.width);
-        reader.read(&pixels, dark, &mut photo)?;
+        reader.read(&self.pixels_of(rows), dark, &mut photo)?;
         reader.finish()?;
         Ok(photo)
     }
@@ -261,6 +260,14 @@ impl<F: CaptureFiles> CaptureFolder<F> {
         let dark = reader.read(pixels)?;
         reader.finish()?;
         Ok(dark)
+    }
+
+    /// Reads these rows of the dark frame, as [`read_dark`](Self::read_dark) does.
+    ///
+    /// # Errors
+    /// If the photograph cannot be read.
+    pub fn read_dark_rows(&self, rows: &CameraRowSet) -> Result<DarkFrame, CaptureError> {
+        self.read_dark(&self.pixels_of(rows))
     }
 
     /// Opens the dark frame, if there is one.
@@ -361,6 +368,11 @@ impl<F: CaptureFiles> CaptureFolder<F> {
             next_row: 0,
             statistics: CodeStatistics::of_photograph(),
         })
+    }
+
+    /// All pixels of these rows.
+    fn pixels_of(&self, rows: &CameraRowSet) -> CameraPixelSet {
+        CameraPixelSet::of_rows(rows.clone(), self.manifest.camera.width)
     }
 
     /// The photograph `name`, which `field` of the manifest names.

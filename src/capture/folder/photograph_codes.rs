@@ -10,6 +10,8 @@ use super::picture_png::PngRowReader;
 use super::picture_tiff::{self, TiffRowReader};
 use crate::capture::code_statistics::CodeStatistics;
 use crate::capture::error::CaptureError;
+#[cfg(not(target_arch = "wasm32"))]
+use crate::tiff_signature::is_tiff;
 use crate::transport::{CHANNELS, Extent};
 
 /// A 16-bit RGB photograph that is read row by row from the top. Pages read PNG only.
@@ -34,7 +36,7 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
         let mut start = Vec::new();
         let read = file.open()?.take(4).read_to_end(&mut start);
         read.map_err(|e| file.io_error(e))?;
-        Ok(match picture_tiff::is_tiff(&start) {
+        Ok(match is_tiff(&start) {
             true => Self::Tiff(Box::new(TiffRowReader::open_within(file, max_bytes)?)),
             false => Self::Png(Box::new(PngRowReader::open(file)?)),
         })

@@ -1,6 +1,7 @@
 //! A picture of a capture: a pattern or a photograph.
 
-use std::io::{self, ErrorKind};
+use std::fmt::Display;
+use std::io;
 
 use super::files::{CaptureFile, CaptureFiles};
 use super::photograph_codes::PhotographCodes;
@@ -64,10 +65,8 @@ impl<'a, F: CaptureFiles> PictureFile<'a, F> {
 
     /// Opens the file.
     pub fn open(&self) -> Result<CaptureFile<'a, F>, CaptureError> {
-        CaptureFile::open(self.files, self.name).map_err(|e| match e.kind() {
-            ErrorKind::NotFound => self.error(CaptureErrorKind::Missing),
-            _ => self.io_error(e),
-        })
+        let file = CaptureFile::open(self.files, self.name);
+        file.map_err(|e| self.error(CaptureErrorKind::of_opening(e)))
     }
 
     /// Refuses a picture whose size is not that of the manifest.
@@ -82,6 +81,12 @@ impl<'a, F: CaptureFiles> PictureFile<'a, F> {
 
     pub fn io_error(&self, error: io::Error) -> CaptureError {
         self.error(CaptureErrorKind::Io(error))
+    }
+
+    /// The file does not have this format, or is damaged.
+    pub fn unreadable(&self, format: &'static str, reason: impl Display) -> CaptureError {
+        let reason = reason.to_string().trim_end_matches('.').to_owned();
+        self.error(CaptureErrorKind::Unreadable(format, reason))
     }
 
     pub fn error(&self, problem: CaptureErrorKind) -> CaptureError {

@@ -55,14 +55,11 @@ fn open<'a, F: CaptureFiles>(
 }
 
 fn unreadable<F: CaptureFiles>(file: &PictureFile<'_, F>, error: DecodingError) -> CaptureError {
-    file.error(match error {
+    match error {
         // The disk or the network is at fault, not the file.
-        DecodingError::IoError(e) if e.raw_os_error().is_some() => CaptureErrorKind::Io(e),
-        error => {
-            let reason = error.to_string().trim_end_matches('.').to_owned();
-            CaptureErrorKind::Unreadable("PNG", reason)
-        }
-    })
+        DecodingError::IoError(e) if e.raw_os_error().is_some() => file.io_error(e),
+        error => file.unreadable("PNG", error),
+    }
 }
 
 fn extent_of<R: BufRead + Seek>(reader: &png::Reader<R>) -> Extent {

@@ -13,19 +13,12 @@ use crate::capture::code_statistics::CodeStatistics;
 use crate::capture::error::{CaptureError, CaptureErrorKind};
 use crate::transport::{CHANNELS, Extent};
 
-/// The first bytes of a TIFF; BigTIFF has 43 (+) instead of 42 (*).
-const SIGNATURES: [&[u8]; 4] = [b"II*\0", b"II+\0", b"MM\0*", b"MM\0+"];
 /// Bytes that are read from a file at a time.
 const READ_BYTES: usize = 1 << 16;
 /// Bytes that are read for a tag: uncompressed strips do not go through the buffer.
 pub(super) const TAG_BYTES: usize = 1 << 10;
 /// Largest strip that is read: as many are in memory as photographs are read at once.
 pub(super) const MAX_STRIP_BYTES: usize = 8 << 20;
-
-/// Whether a file that begins with these bytes is a TIFF.
-pub(super) fn is_tiff(start: &[u8]) -> bool {
-    SIGNATURES.contains(&start)
-}
 
 /// The first picture of a TIFF, row by row from the top.
 pub(super) struct TiffRowReader<'a, F: CaptureFiles> {
@@ -47,8 +40,7 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
         let layout = Layout::read(&mut decoder).map_err(|e| unreadable(&file, e))?;
         file.check_extent(layout.extent)?;
         if layout.extent.area() == 0 {
-            let reason = "it has no pixels".to_owned();
-            return Err(file.error(CaptureErrorKind::Unreadable("TIFF", reason)));
+            return Err(file.unreadable("TIFF", "it has no pixels"));
         }
         layout.check(max_bytes).map_err(|e| file.error(e))?;
         let record = IngestRecord::read(&mut decoder).map_err(|e| unreadable(&file, e))?;
@@ -111,7 +103,7 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
             if record.checksums.get(i as usize) != Some(&checksum) {
                 let last = first + rows - 1;
                 let reason = format!("the checksum of rows {first} to {last} is wrong");
-                return Err(self.unreadable(&reason));
+                return Err(self.file.unreadable("TIFF", reason));
             }
         }
         self.strip = Some((i, strip));
@@ -140,11 +132,6 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
         };
         let statistics = record.statistics(&mut self.decoder, saturated_from);
         statistics.map(Some).map_err(|e| unreadable(&self.file, e))
-    }
-
-    fn unreadable(&self, reason: &str) -> CaptureError {
-        let problem = CaptureErrorKind::Unreadable("TIFF", reason.to_owned());
-        self.file.error(problem)
     }
 }
 
@@ -220,14 +207,11 @@ impl Layout {
 }
 
 fn unreadable<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> CaptureError {
-    file.error(match error {
+    match error {
         // The disk or the network is at fault, not the file.
-        TiffError::IoError(e) if e.raw_os_error().is_some() => CaptureErrorKind::Io(e),
-        error => {
-            let reason = error.to_string().trim_end_matches('.').to_owned();
-            CaptureErrorKind::Unreadable("TIFF", reason)
-        }
-    })
+        TiffError::IoError(e) if e.raw_os_error().is_some() => file.io_error(e),
+        error => file.unreadable("TIFF", error),
+    }
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ use super::progress;
 use super::value_parsers::UsageError;
 use crate::acquisition::{PatternSequence, SEQUENCE_NAME};
 use crate::calibrate::GrayCodeFit;
-use crate::capture::{CameraPixelSet, CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME};
+use crate::capture::{CameraResponse, CameraRowSet, CaptureFolder, MANIFEST_NAME};
 use crate::transport::{Extent, TileRect};
 
 /// Rows of the Gray code that are decoded, at most.
@@ -204,8 +204,7 @@ pub fn fit_gray_code(folder: &Path) -> Result<GrayCodeFit> {
     let row = |i: u32| (u64::from(i) * u64::from(camera.height) / u64::from(count)) as u32;
     let rows = (0..count).map(|i| row(i)..row(i) + 1);
     let rows = CameraRowSet::from_strips(rows);
-    let pixels = CameraPixelSet::of_rows(rows.clone(), camera.width);
-    let gray_code = folder.read_gray_code(&folder.read_dark(&pixels)?, &rows)?;
+    let gray_code = folder.read_gray_code(&folder.read_dark_rows(&rows)?, &rows)?;
     let fit = gray_code.fit(camera);
     fit.with_context(|| folder.manifest_path().display().to_string())
 }

@@ -5,8 +5,8 @@ use anyhow::{Context, Result};
 use rayon::prelude::*;
 
 use crate::capture::{
-    CameraPixelSet, CameraRowSet, CaptureError, CaptureFolder, LinearPhoto, ListedPhotograph,
-    Manifest, ManifestCamera, NoiseModel, PhotographRole, PhotographScan,
+    CameraPixelSet, CameraRowSet, CaptureError, CaptureFolder, DarkFrame, LinearPhoto,
+    ListedPhotograph, Manifest, ManifestCamera, PhotographRole, PhotographScan,
 };
 use crate::cli::measurement_reader::ReadSample;
 use crate::cli::process_resources::InterruptibleCores;
@@ -14,7 +14,7 @@ use crate::cli::progress;
 use crate::cli::recover::capture_sample::{CaptureSample, PhotographSource};
 use crate::job_executor::{Cancelled, Executor};
 use crate::recover::{Method, preparation_pixels};
-use crate::transport::{CHANNELS, CameraPixel, Correspondence, TileRect, Window};
+use crate::transport::{CHANNELS, Correspondence, TileRect, Window};
 
 /// Memory for shots that are loaded whole, and for the sampled rows of the Gray code.
 const WHOLE_SHOTS_BYTES: usize = 560 << 20;
@@ -173,29 +173,19 @@ impl<'a> ScannedCapture<'a> {
     pub fn sample(&self, folder: CaptureFolder, shots: Vec<usize>) -> Result<CaptureSample> {
         let manifest = folder.manifest();
         let camera = &manifest.camera;
-        let dark = self.dark_of(PhotographRole::Flood, camera);
+        let light = self.dark_of(PhotographRole::Flood, camera);
+        let dark = DarkFrame::new(self.sampled.shots.clone(), light, camera);
         let code = (camera.white - camera.black).recip();
-        let spans: Vec<&[[f32; CHANNELS]]> = self
-            .sampled
-            .noise
-            .rects()
-            .filter_map(|span| {
-                let pixel = CameraPixel {
-                    x: span.x,
-                    y: span.y,
-                };
-                let first = self.sampled.shots.index_of(pixel)?;
-                dark.get(first..first + span.extent.area())
-            })
-            .collect();
-        let noise = NoiseModel::from_dark_rows(spans.into_iter(), code);
+        let noise = dark.noise(&self.sampled.noise);
         let patterns = shots.par_iter().map(|&i| folder.read_pattern(i));
         let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
         let declared = manifest.correspondence.as_ref();
         let correspondence = declared.or(self.correspondence.as_ref()).cloned();
         let correspondence = correspondence.context("the correspondence is unknown")?;
         let measure = |scan: &PhotographScan, exposure: f64| -> LinearPhoto {
-            camera.measure(&scan.pixels, exposure, &dark).collect()
+            camera
+                .measure(&scan.pixels, exposure, dark.light())
+                .collect()
         };
         let scans = shots.iter().map(|&i| self.scan(PhotographRole::Shot(i)));
         let scans = scans.collect::<Option<Vec<_>>>();

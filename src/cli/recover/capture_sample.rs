@@ -3,13 +3,12 @@
 use anyhow::Result;
 
 use crate::calibrate::LightPlaneAxis;
-use crate::capture::{CameraPixelSet, CameraRowSet, CaptureFolder, Manifest, Measurements};
+use crate::capture::{CameraRowSet, CaptureFolder, Manifest, Measurements};
 use crate::cli::measurement_reader::{
     MeasurementReader, ReadSample, read_patterns, read_sample_of,
 };
 use crate::cli::process_resources::InterruptibleCores;
 use crate::export::MemoryPlan;
-use crate::transport::Extent;
 
 /// Camera rows from which the contrast of Gray code is measured.
 const MAX_CONTRAST_ROWS: u32 = 128;
@@ -110,12 +109,11 @@ impl PhotographSource for SampleSource<'_> {
 
     fn finest_contrasts(&self, sample: &CaptureSample) -> Option<[f32; 2]> {
         // A few, as the photographs are in memory.
-        let Extent { width, height } = sample.measurements.camera;
+        let height = sample.measurements.camera.height;
         let step = height.div_ceil(MAX_CONTRAST_ROWS);
         let rows = (0..height).step_by(step as usize).map(|y| y..y + 1);
         let rows = CameraRowSet::from_strips(rows);
-        let pixels = CameraPixelSet::of_rows(rows.clone(), width);
-        let dark = sample.folder.read_dark(&pixels).ok()?;
+        let dark = sample.folder.read_dark_rows(&rows).ok()?;
         let contrast = |axis, bit| {
             let photos = sample.folder.read_gray_code_bit(&dark, &rows, axis, bit);
             photos.ok()?.best_contrast()

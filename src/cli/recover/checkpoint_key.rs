@@ -149,16 +149,12 @@ impl FileDigest {
 
     /// Reads the record of a photograph that was ingested; `None` of other files.
     pub fn of_record(path: &Path) -> Result<Option<Self>, CaptureError> {
-        let read = || -> io::Result<Option<Self>> {
-            let Some(ingested) = IngestedPhotograph::read(path)? else {
-                return Ok(None);
-            };
-            Ok(Some(Self {
-                bytes: path.metadata()?.len(),
-                crc: ingested.checksum,
-            }))
-        };
-        read().map_err(|e| CaptureError::new(path, CaptureErrorKind::Io(e)))
+        let record = IngestedPhotograph::read(path);
+        let record = record.map_err(|e| CaptureError::new(path, CaptureErrorKind::Io(e)))?;
+        Ok(record.map(|photograph| Self {
+            bytes: photograph.bytes,
+            crc: photograph.checksum,
+        }))
     }
 }
 

@@ -276,7 +276,7 @@ impl CopyManifest {
     }
 }
 
-/// Creates the folder of the copy. What is in a folder that has the manifest of a source may be replaced.
+/// Creates the folder of the copy. Files are replaced only in a folder that has the manifest of a source.
 ///
 /// # Errors
 /// If it has other files.
@@ -322,13 +322,7 @@ fn modified(path: &Path) -> Result<(SystemTime, u64), CaptureError> {
 }
 
 fn read_error(path: &Path, error: io::Error) -> CaptureError {
-    CaptureError::new(
-        path,
-        match error.kind() {
-            io::ErrorKind::NotFound => CaptureErrorKind::Missing,
-            _ => CaptureErrorKind::Io(error),
-        },
-    )
+    CaptureError::new(path, CaptureErrorKind::of_opening(error))
 }
 
 /// A path relative to a folder, without `.` and doubled separators; `None` if it leads out of the folder.

@@ -130,14 +130,13 @@ impl RecoveryPlan {
             cores.check_cancelled()?;
             let path = capture.root().join(name);
             let is_compared_whole = name == MANIFEST_NAME || comparison == Comparison::Contents;
-            let record = match is_compared_whole {
-                true => None,
+            let digest = match is_compared_whole {
+                true => Some(FileDigest::of(&path)?),
                 false => FileDigest::of_record(&path)?,
             };
-            let is_same = match (is_compared_whole, record) {
-                (true, _) => FileDigest::of(&path)? == *planned,
-                (_, Some(record)) => record == *planned,
-                (false, None) => {
+            let is_same = match digest {
+                Some(digest) => digest == *planned,
+                None => {
                     let file = path.metadata();
                     let file = file.map_err(|e| CaptureError::new(&path, CaptureErrorKind::Io(e)));
                     file?.len() == planned.bytes
