@@ -6,14 +6,14 @@ mod common;
 use common::{Noise, functions, geometry, sealed};
 use proptest::prelude::*;
 use relightable_photo::format::{
-    self, ChunkId, ChunkSelection, DistortionMetric, EncodedFile, EncoderInput, EncodingTarget,
-    FormatError, FormatExtension, HEADER_BYTES, Limits, LtmReader, Metadata, ProgressiveScan,
-    ScanCoding, SectionName, TextModeDamage,
+    self, ChunkId, ChunkSelection, ChunkStore, CodingPlan, DistortionMetric, EncodedFile,
+    EncoderInput, EncodingTarget, FormatError, FormatExtension, HEADER_BYTES, Limits, LtmReader,
+    Metadata, ProgressiveScan, ScanCoding, SectionName, TextModeDamage, TileEncoder, TileSample,
 };
 use relightable_photo::job_executor::{Executor, SequentialExecutor};
 use relightable_photo::transport::{
-    Basis, CHANNELS, Decibels, FloatTile, Geometry, SnrAccumulator, Tile, TileTransportFunctions,
-    Transport,
+    Basis, CHANNELS, Decibels, Extent, FloatTile, Geometry, SnrAccumulator, Tile, TileRect,
+    TileTransportFunctions, Transport,
 };
 
 /// A recovered light transport.
@@ -96,6 +96,51 @@ impl Recovered {
             extensions,
         };
         EncodedFile::new(source, quality, executor)
+    }
+
+    /// Plans the file from a square of `side` pixels of each of the tiles `sampled`, and encodes its tiles from the last to the first.
+    fn encode_planned(
+        &self,
+        quality: EncodingTarget<'_>,
+        side: u32,
+        sampled: fn(&FloatTile) -> bool,
+    ) -> EncodedFile {
+        let square = |tile: &FloatTile| {
+            let Extent { width, height } = tile.rect.extent;
+            tile.crop(TileRect {
+                extent: Extent::new(side.min(width), side.min(height)),
+                ..tile.rect
+            })
+        };
+        let sample = TileSample {
+            geometry: &self.geometry,
+            basis: self.basis.as_ref(),
+            tiles: self
+                .tiles
+                .iter()
+                .filter(|tile| sampled(tile))
+                .map(square)
+                .collect(),
+            may_have_functions: self.tiles.iter().any(|tile| !tile.functions.is_empty()),
+            max_measurement: 10.0,
+        };
+        let plan = CodingPlan::new(sample, quality, &SequentialExecutor).unwrap();
+        // As a file of several machines has it.
+        let plan = serde_json::to_vec(&plan).unwrap();
+        let plan: CodingPlan = serde_json::from_slice(&plan).unwrap();
+        let encoder = TileEncoder::new(&plan, &self.geometry, self.basis.as_ref()).unwrap();
+        let mut store = Vec::<Vec<u8>>::new();
+        let count = self.tiles.len();
+        let encode = |(i, tile): (usize, &FloatTile)| {
+            let encoded = encoder.encode(tile.clone()).unwrap();
+            for (scan, chunk) in encoded.chunks.into_iter().enumerate() {
+                store.put(scan * (count + 1) + i + 1, chunk).unwrap();
+            }
+            encoded.head
+        };
+        let heads: Vec<_> = self.tiles.iter().enumerate().rev().map(encode).collect();
+        let heads = heads.iter().rev();
+        EncodedFile::of_tiles(&plan, self.geometry.clone(), heads, store, &metadata()).unwrap()
     }
 
     fn file(&self, quality: EncodingTarget<'_>) -> Vec<u8> {
@@ -1197,7 +1242,15 @@ fn scans_keep_their_shares_of_the_file() {
         ),
         (Recovered::direct(geometry, 5), EncodingTarget::Lossless),
     ] {
-        let encoded = recovered.encode(target).unwrap();
+        for encoded in [
+            recovered.encode(target).unwrap(),
+            recovered.encode_planned(target, 16, |_| true),
+        ] {
+            keeps_its_shares(&encoded, target);
+        }
+    }
+
+    fn keeps_its_shares(encoded: &EncodedFile, target: EncodingTarget<'_>) {
         let index = encoded.index();
         let share = |bytes: u64| bytes as f64 / encoded.bytes() as f64;
         // The first layer ends where the first coding begins again.
@@ -1215,6 +1268,96 @@ fn scans_keep_their_shares_of_the_file() {
             assert!(index.scans[scan].snr.0 > snr, "scan {scan} for {target:?}");
             snr = index.scans[scan].snr.0;
         }
+    }
+}
+
+#[test]
+fn tiles_encoded_one_by_one_have_the_snr_that_their_plan_is_for() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let geometry = common::tiled([120, 90], [64, 64], 5, 32, affine);
+    for recovered in [
+        Recovered::mixed(geometry.clone(), 8, 5),
+        Recovered::direct(geometry, 7),
+    ] {
+        for quality in [20.0, 35.0, 55.0] {
+            let target = EncodingTarget::Snr(Decibels(quality));
+            let encoded = recovered.encode_planned(target, 8, |_| true);
+            let (decoded, _) = decode(&bytes(&encoded), usize::MAX).unwrap();
+            let (declared, snr) = (encoded.snr().unwrap().0, recovered.error(&decoded).snr());
+            assert!((declared - quality).abs() < 1.0, "{declared} for {quality}");
+            // The encoder also counts values off the light plane.
+            let snr = snr.unwrap().0;
+            assert!(
+                (snr - declared).abs() < 1.0,
+                "{snr}, declared as {declared}"
+            );
+            // Not much larger than the file that is planned from all tiles.
+            let whole = recovered
+                .encode(EncodingTarget::Snr(Decibels(declared)))
+                .unwrap();
+            let ratio = encoded.bytes() as f64 / whole.bytes() as f64;
+            assert!(ratio < 1.06, "{ratio} at {quality} dB");
+        }
+        let encoded = recovered.encode_planned(EncodingTarget::Lossless, 8, |_| true);
+        let (decoded, _) = decode(&bytes(&encoded), usize::MAX).unwrap();
+        let snr = recovered.error(&decoded).snr();
+        assert!(snr.unwrap().0 > 55.0, "{snr:?}");
+    }
+}
+
+#[test]
+fn tiles_may_be_of_a_kind_that_the_sample_lacks() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let geometry = common::tiled([120, 90], [64, 64], 5, 32, affine);
+    let recovered = Recovered::mixed(geometry, 4, 5);
+    let direct = |tile: &FloatTile| tile.coefficients.is_empty();
+    let factored = |tile: &FloatTile| tile.functions.is_empty();
+    for target in [QUALITY, EncodingTarget::Lossless] {
+        for sampled in [direct, factored] {
+            let encoded = recovered.encode_planned(target, 8, sampled);
+            let (decoded, _) = decode(&bytes(&encoded), usize::MAX).unwrap();
+            let snr = recovered.error(&decoded).snr().unwrap().0;
+            // The other half of the tiles has another error for its energy, but is there.
+            assert!(snr > 20.0, "{snr} for {target:?}");
+            let declared = encoded.snr().unwrap().0.min(52.0);
+            assert!(snr > declared - 1.0, "{snr}, declared as {declared}");
+        }
+    }
+}
+
+#[test]
+fn tiles_may_be_brighter_than_all_of_the_sample() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let geometry = common::tiled([64, 64], [32, 32], 3, 16, affine);
+    // A glint, in a corner that the sample does not have.
+    let mut recovered = Recovered::mixed(geometry.clone(), 4, 5);
+    for tile in &mut recovered.tiles {
+        for values in [&mut tile.coefficients, &mut tile.functions] {
+            let pixel = values.len() / 256;
+            let first = 255 * pixel;
+            values[first..]
+                .iter_mut()
+                .flatten()
+                .for_each(|v| *v *= 30.0);
+        }
+    }
+    // A sample without any light.
+    let mut dark = Recovered::direct(geometry, 7);
+    for tile in &mut dark.tiles {
+        let pixel = tile.functions.len() / 256;
+        tile.functions[..200 * pixel].fill([0.0; CHANNELS]);
+    }
+    for (recovered, quality) in [(recovered.clone(), 35.0), (recovered, 60.0), (dark, 40.0)] {
+        let encoded = recovered.encode_planned(EncodingTarget::Snr(Decibels(quality)), 8, |_| true);
+        let (decoded, _) = decode(&bytes(&encoded), usize::MAX).unwrap();
+        let snr = recovered.error(&decoded).snr().unwrap().0;
+        assert!(snr > quality - 10.0, "{snr}");
+        // Rounding to twelve bits adds noise.
+        let declared = encoded.snr().unwrap().0;
+        assert!(
+            snr > declared.min(52.0) - 1.0,
+            "{snr}, declared as {declared}"
+        );
     }
 }
 

@@ -4,9 +4,13 @@ use std::io::{self, ErrorKind};
 use std::ops::Range;
 
 use super::tile_record;
+#[cfg(not(target_arch = "wasm32"))]
+use crate::capture::Measurements;
 use crate::format::{
     ChunkStore, DistortionMetric, EncodedFile, EncoderInput, EncodingTarget, FormatError, Metadata,
 };
+#[cfg(not(target_arch = "wasm32"))]
+use crate::format::{CodingPlan, EncodedTile, TileEncoder, TileSample};
 use crate::job_executor::Executor;
 use crate::recover::{HoldoutValidation, PreparedRecovery};
 use crate::transport::{Basis, Decibels, FloatTile, Geometry, TileTransportFunctions};
@@ -20,6 +24,13 @@ const DEFAULT_LOSS: Decibels = Decibels(0.5);
 /// Default SNR of the file relative to the recovered transport without hold-out validation. With so few patterns the
 /// transport is noisy.
 const DEFAULT_SNR: Decibels = Decibels(32.0);
+
+/// Camera pixels of a picture that is no larger than the sample, so that all of its tiles are analysed before one is encoded.
+#[cfg(not(target_arch = "wasm32"))]
+const MAX_WHOLLY_ANALYSED: usize = 1 << 14;
+/// Number of tiles that are encoded at a time.
+#[cfg(not(target_arch = "wasm32"))]
+const BATCH_TILES: usize = 64;
 
 /// The quality of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -89,6 +100,99 @@ pub fn encode_file<S: ChunkStore>(
         quality.target(recovery.holdout_validation()),
         executor,
     )
+}
+
+/// Plans the file from squares of the picture, so that its tiles can be encoded one by one. `measurements` are those that the
+/// recovery was prepared from. Returns `None` where all tiles decide: for a number of bytes, and for small pictures.
+///
+/// # Errors
+/// Those of [`CodingPlan::new`].
+#[cfg(not(target_arch = "wasm32"))]
+pub fn plan_file(
+    recovery: &PreparedRecovery,
+    measurements: &Measurements,
+    quality: FileQuality,
+    executor: &impl Executor,
+) -> Result<Option<CodingPlan>, FormatError> {
+    let geometry = file_geometry(recovery);
+    if matches!(quality, FileQuality::MaxBytes(_)) || geometry.camera.area() <= MAX_WHOLLY_ANALYSED
+    {
+        return Ok(None);
+    }
+    let sample = TileSample {
+        geometry: &geometry,
+        basis: recovery.basis(),
+        tiles: recovery.sample_tiles(measurements, executor),
+        may_have_functions: recovery.may_have_functions(),
+        max_measurement: measurements.full_scale.iter().copied().fold(0.0, f32::max),
+    };
+    let target = quality.target(recovery.holdout_validation());
+    CodingPlan::new(sample, target, executor).map(Some)
+}
+
+/// Encodes all tiles of `recovery` by a plan. `record` gives that of a tile, as [`encode_tile`](super::encode_tile) made it, and
+/// `store` takes the chunks.
+///
+/// # Errors
+/// [`FormatError::Source`] as those of [`encode_file`], [`FormatError::Compress`], and those of the store and of metadata.
+#[cfg(not(target_arch = "wasm32"))]
+pub fn encode_planned<S: ChunkStore>(
+    recovery: &PreparedRecovery,
+    plan: &CodingPlan,
+    record: &(dyn Fn(usize) -> io::Result<Vec<u8>> + Sync),
+    metadata: &Metadata,
+    executor: &impl Executor,
+    mut store: S,
+) -> Result<EncodedFile<S>, FormatError> {
+    let geometry = file_geometry(recovery);
+    let tiles = geometry.tile_grid().area();
+    let mut heads = Vec::with_capacity(tiles);
+    for_encoded_tiles(
+        recovery,
+        plan,
+        record,
+        0..tiles,
+        executor,
+        |tile, encoded| {
+            heads.push(encoded.head);
+            let chunks = encoded.chunks.into_iter().enumerate();
+            let mut chunks = chunks.filter(|(_, bytes)| !bytes.is_empty());
+            chunks.try_for_each(|(scan, bytes)| store.put(scan * (tiles + 1) + tile + 1, bytes))
+        },
+    )?;
+    EncodedFile::of_tiles(plan, geometry, heads.iter(), store, metadata)
+}
+
+/// Encodes these `tiles` of the file by a plan, and gives them to `take` in order.
+///
+/// # Errors
+/// [`FormatError::Source`] as those of [`encode_file`], [`FormatError::Compress`], and those of `take`.
+#[cfg(not(target_arch = "wasm32"))]
+pub fn for_encoded_tiles<E: From<FormatError>>(
+    recovery: &PreparedRecovery,
+    plan: &CodingPlan,
+    record: &(dyn Fn(usize) -> io::Result<Vec<u8>> + Sync),
+    tiles: Range<usize>,
+    executor: &impl Executor,
+    mut take: impl FnMut(usize, EncodedTile) -> Result<(), E>,
+) -> Result<(), E> {
+    let geometry = file_geometry(recovery);
+    let encoder = TileEncoder::new(plan, &geometry, recovery.basis())?;
+    let encode = |i: usize| match executor.is_cancelled() {
+        true => Err(FormatError::Source(ErrorKind::Interrupted.into())),
+        false => {
+            let tile = file_tile(recovery, record, i);
+            encoder.encode(tile.map_err(FormatError::Source)?)
+        }
+    };
+    for first in tiles.clone().step_by(BATCH_TILES) {
+        let count = BATCH_TILES.min(tiles.end - first);
+        let encoded = executor.map(count, |i| encode(first + i));
+        for (i, tile) in encoded.into_iter().enumerate() {
+            take(first + i, tile?)?;
+        }
+    }
+    Ok(())
 }
 
 /// The geometry of the file, whose tiles are larger than those of `recovery`.

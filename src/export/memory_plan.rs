@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use super::encoding::FILE_TILE_SIDE;
 use crate::capture::{CameraPixelSet, CameraRowSet};
-use crate::recover::{Method, WindowSizeEstimate, preparation_pixels};
+use crate::recover::{Method, PreparedRecovery, WindowSizeEstimate, preparation_pixels};
 use crate::transport::{CHANNELS, Extent, Geometry, Window};
 
 /// Camera pixels along a side of a recovered tile.
@@ -164,7 +164,9 @@ impl MemoryPlan {
         let photographs = shots as u64;
         let width = u64::from(camera.width);
         let fixed_bytes = PROGRAM_BYTES
-            + method.preparation_bytes(max_window, shots) as u64
+            + method
+                .preparation_bytes(max_window, shots)
+                .max(PreparedRecovery::sample_bytes(max_window)) as u64
             + PIXEL_BYTES * (shots * light.area()) as u64 // patterns, of any colour
             + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width);
         // The functions of a tile as real numbers, as codes, and as byte planes to compress.

@@ -16,6 +16,8 @@ mod tile_record;
 pub use capture_remedy::capture_remedy;
 pub use encoding::{FILE_TILE_SIDE, FileQuality, encode_file, file_geometry, file_tile};
 #[cfg(not(target_arch = "wasm32"))]
+pub use encoding::{encode_planned, for_encoded_tiles, plan_file};
+#[cfg(not(target_arch = "wasm32"))]
 pub use memory_plan::{CaptureSize, EncodingMemory, MemoryPlan, TooLittleMemory};
 pub use metadata::{Provenance, metadata};
 pub use preparation::{

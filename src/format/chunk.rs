@@ -1,5 +1,7 @@
 //! Chunks: runs of bytes that have their own length and checksum.
 
+use serde::{Deserialize, Serialize};
+
 /// A basis chunk or a tile chunk of one scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ChunkId {
@@ -20,7 +22,7 @@ impl std::fmt::Display for ChunkId {
 }
 
 /// The directory's entry for a tile chunk.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ChunkEntry {
     /// Bytes in the file; 0 if there is no chunk, which stands for zeros.
     pub bytes: u32,

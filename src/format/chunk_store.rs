@@ -21,7 +21,7 @@ pub trait ChunkStore {
     /// Chunk number `number`; empty if none was kept.
     ///
     /// # Errors
-    /// [`FormatError::Spool`].
+    /// [`FormatError::Spool`], and [`FormatError::Source`] of a store that others wrote.
     fn get(&self, number: usize) -> Result<Cow<'_, [u8]>, FormatError>;
 }
 

@@ -45,6 +45,8 @@ pub use chunk_store::ChunkStore;
 #[cfg(not(target_arch = "wasm32"))]
 pub use chunk_store::SpooledChunks;
 pub use constants::{FIRST_BYTES, HEADER_BYTES, MAX_RANK};
+#[cfg(not(target_arch = "wasm32"))]
+pub use encode::{CodingPlan, EncodedTile, EncodedTileHead, TileEncoder, TileSample};
 pub use encode::{DistortionMetric, EncodedFile, EncoderInput, EncodingTarget};
 pub use error::{FormatError, SectionName, TextModeDamage};
 pub use extension::FormatExtension;

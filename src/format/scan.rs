@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use super::constants::SCAN_RECORD_BYTES;
 use super::fields::FieldReader;
 use crate::transport::Decibels;
 
 /// How a scan's values are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u16)]
 pub enum ScanCoding {
     /// Coefficients: colour transform, cosine transform, quantisation.
@@ -34,7 +36,7 @@ pub(super) fn rank_of(scans: &[ProgressiveScan]) -> usize {
 }
 
 /// One pass over all tiles. A decoded value is the sum of what its scans bring.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProgressiveScan {
     /// How its values are written.
     pub coding: ScanCoding,

@@ -213,11 +213,12 @@ mod tests {
             let shots: Vec<usize> = (0..PATTERNS).collect();
             let diagnosis = diagnose(&measurements, settings.window, &shots, &[], executor);
             format!(
-                "{} {:?} {:?} {:?} {estimate:?} {:?} {:?} {:?} {diagnosis:?}",
+                "{} {:?} {:?} {:?} {:?} {estimate:?} {:?} {:?} {:?} {diagnosis:?}",
                 serde_json::to_string(&recovery).unwrap(),
                 measurements.noise,
                 validation.snr(),
                 tiles,
+                recovery.sample_tiles(&measurements, executor),
                 recovery.flicker(&measurements, executor),
                 recovery.flood_shortfall(&measurements, 1.0, executor),
                 recovery.response(&measurements, 1.0, executor).await,

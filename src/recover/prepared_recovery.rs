@@ -19,6 +19,8 @@ use super::preparation_input::{self, RecoveryPreparationInput};
 use super::sampling::{self, MIN_PATTERNS};
 use crate::capture::Measurements;
 use crate::job_executor::Executor;
+#[cfg(not(target_arch = "wasm32"))]
+use crate::transport::CHANNELS;
 use crate::transport::{Basis, FloatTile, Geometry, TileRect, Window};
 
 /// The same as [`PreparedRecovery::response`], for measurements that no recovery can be prepared from: their photographs
@@ -54,6 +56,12 @@ pub async fn find_response(
 
 /// Root mean square shift, in camera pixels, that costs accuracy although it is corrected.
 const MIN_TREMBLING: f64 = 0.05;
+
+/// Memory for the functions of sampled squares: of wide windows there are fewer squares, but at least so many.
+#[cfg(not(target_arch = "wasm32"))]
+const MAX_SAMPLE_BYTES: usize = 48 << 20;
+#[cfg(not(target_arch = "wasm32"))]
+const MIN_SAMPLED_SQUARES: usize = 8;
 
 /// The options of a recovery.
 #[derive(Clone, Copy, Debug)]
@@ -176,6 +184,15 @@ impl PreparedRecovery {
         }
     }
 
+    /// Whether tiles may be direct.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn may_have_functions(&self) -> bool {
+        match &self.solver {
+            TileSolver::Learned(learned) => learned.common_mode().is_some(),
+            TileSolver::Pixelwise(_) => true,
+        }
+    }
+
     /// Corrections of the photographs, one for each; none at all if no photograph needs one.
     pub fn corrections(&self) -> &[PhotographCorrection] {
         &self.photometry.corrections
@@ -285,6 +302,40 @@ impl PreparedRecovery {
             TileSolver::Learned(learned) => learned.halo(),
             TileSolver::Pixelwise(_) => 0,
         }
+    }
+
+    /// Upper estimate of the memory that [`sample_tiles`](Self::sample_tiles) and a plan of a file from them take, in bytes:
+    /// their functions twice.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn sample_bytes(window: Window) -> usize {
+        let pixels = super::learned::REGION_SIDE_PX.pow(2) as usize;
+        let square = pixels * window.area() * CHANNELS * size_of::<f32>();
+        let all = super::learned::MAX_REGIONS * square;
+        2 * all.min(MAX_SAMPLE_BYTES.max(MIN_SAMPLED_SQUARES * square))
+    }
+
+    /// Recovers squares of the picture, spread evenly, from all patterns. `measurements` are those that the recovery was
+    /// prepared from. A basis that is rotated to the squares' own axes suits others less: they are not those of the
+    /// [validation](Self::holdout_validation), if there is a basis.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn sample_tiles(
+        &self,
+        measurements: &Measurements,
+        executor: &impl Executor,
+    ) -> Vec<FloatTile> {
+        let camera = self.geometry.camera;
+        let mut squares = match &self.solver {
+            TileSolver::Learned(_) => super::learned::sample_regions(camera),
+            TileSolver::Pixelwise(_) => super::holdout_validation::sample_squares(camera),
+        };
+        let values = match self.may_have_functions() {
+            true => self.geometry.window.area(),
+            false => self.basis().map_or(0, Basis::rank),
+        };
+        let square = squares.first().map_or(0, |square| square.extent.area());
+        let bytes = square * values * CHANNELS * size_of::<f32>();
+        squares.truncate((MAX_SAMPLE_BYTES / bytes.max(1)).max(MIN_SAMPLED_SQUARES));
+        executor.map(squares.len(), |i| self.tile(measurements, squares[i]))
     }
 
     /// Recovers one tile. `measurements` are those that the recovery was prepared from, or other pixels of the same

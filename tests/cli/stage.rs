@@ -138,7 +138,7 @@ fn report(output: &Output) -> Value {
 
 #[test]
 fn shards_write_the_bytes_of_one_recovery() {
-    // Four rows of the file's tiles.
+    // Four rows of the file's tiles, which are encoded one by one.
     let job = Job::new("64x400", &[], &LEARNED);
     let recovered = job.recover(&[]);
     job.plan(&[]);
@@ -198,7 +198,7 @@ fn what_is_learned_of_a_faulty_capture_holds_in_all_shards() {
 
 #[test]
 fn a_killed_shard_resumes_and_two_at_once_do_no_harm() {
-    let job = Job::new("64x256", &[], &NNLS);
+    let job = Job::new("64x264", &[], &NNLS);
     let recovered = job.recover(&[]);
     job.plan(&[]);
     job.learn();
@@ -262,7 +262,7 @@ fn a_shard_resumes_from_the_intact_tiles_of_partial_packs() {
 
 #[test]
 fn an_interrupted_shard_keeps_its_tiles() {
-    let job = Job::new("64x256", &[], &LEARNED);
+    let job = Job::new("64x264", &[], &LEARNED);
     job.plan(&[]);
     job.learn();
     let mut tiles = command(&job.tiles_args("1/1"));
@@ -290,7 +290,7 @@ fn an_interrupted_shard_keeps_its_tiles() {
 
 #[test]
 fn files_of_other_stages_are_checked_and_named() {
-    let job = Job::new("64x256", &[], &NNLS);
+    let job = Job::new("64x264", &[], &NNLS);
     let stages = text(&job.stages);
     let file = job.path("file.ltm");
     let assemble = [

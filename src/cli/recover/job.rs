@@ -11,7 +11,7 @@ use super::capture_sample::{CaptureSample, SampleSource};
 use super::checkpoint::{Checkpoint, lock};
 use super::checkpoint_key::{CheckpointKey, recovery_fingerprint};
 use super::inputs::{RecoveryInputs, encoders};
-use super::ltm_writer::{Destination, finish};
+use super::ltm_writer::{Destination, RecoveredTiles, finish};
 use super::prepared_job::PreparedJob;
 use super::report::RecoverReport;
 use super::tile_recovery::{TilePhotographs, TileRecovery};
@@ -88,6 +88,7 @@ impl RecoverJob<'_> {
             too_large_remedy: TOO_LARGE_REMEDY,
         };
         let record = |i| lock(checkpoint).read(i);
-        finish(self.start, self.inputs, job, counts, &destination, &record)
+        let tiles = RecoveredTiles(&record);
+        finish(self.start, self.inputs, job, counts, &destination, &tiles)
     }
 }

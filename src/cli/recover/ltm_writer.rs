@@ -17,7 +17,7 @@ use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, thread_pool};
 use crate::cli::progress;
 use crate::export::{self, EncodingMemory, FileQuality};
-use crate::format::{EncodedFile, FormatError, Metadata, SpooledChunks};
+use crate::format::{ChunkStore, EncodedFile, FormatError, Metadata, SpooledChunks};
 use crate::job_executor::Cancelled;
 use crate::pyramid::PyramidLayout;
 use crate::transport::Decibels;
@@ -39,8 +39,63 @@ pub struct Destination<'a> {
     pub too_large_remedy: &'static str,
 }
 
+/// What a file is encoded from beside its tiles.
+pub struct WriterInput<'a> {
+    pub job: &'a PreparedJob,
+    pub metadata: &'a Metadata,
+    pub destination: &'a Destination<'a>,
+}
+
+/// The tiles of a file.
+pub trait FileTiles: Sync {
+    /// Where the chunks of the file are.
+    type Store: ChunkStore + Sync;
+
+    /// The file of one level.
+    ///
+    /// # Errors
+    /// If a tile cannot be read, or the target not be reached.
+    fn encode(
+        &self,
+        input: &WriterInput<'_>,
+        quality: FileQuality,
+    ) -> Result<EncodedFile<Self::Store>, FormatError>;
+}
+
+/// Recovered tiles, whose records this function reads.
+pub struct RecoveredTiles<'a>(pub &'a ReadTile<'a>);
+
+impl FileTiles for RecoveredTiles<'_> {
+    type Store = SpooledChunks<File>;
+
+    fn encode(
+        &self,
+        input: &WriterInput<'_>,
+        quality: FileQuality,
+    ) -> Result<EncodedFile<Self::Store>, FormatError> {
+        let WriterInput {
+            job,
+            metadata,
+            destination,
+        } = *input;
+        let Destination { output, cores, .. } = *destination;
+        let new_store = || temporary_spool(output).map(SpooledChunks::new);
+        let recovery = &job.recovery;
+        match &job.coding {
+            Some(plan) => {
+                export::encode_planned(recovery, plan, self.0, metadata, cores, new_store()?)
+            }
+            None => {
+                let metadata = metadata.clone();
+                export::encode_file(recovery, self.0, metadata, quality, cores, new_store)
+            }
+        }
+    }
+}
+
 /// Writes the file of a recovery.
-struct LtmWriter<'a> {
+struct LtmWriter<'a, T> {
+    tiles: &'a T,
     destination: &'a Destination<'a>,
     job: &'a PreparedJob,
     quality: FileQuality,
@@ -48,7 +103,7 @@ struct LtmWriter<'a> {
     levels: u32,
 }
 
-/// Writes the file of tiles that `record` reads, as `recover` and its last stage do. `counts` are those of the tiles.
+/// Writes the file of `tiles`, as `recover` and its last stage do. `counts` are those of the tiles.
 ///
 /// # Errors
 /// If there is a warning and `--strict`, and if the file cannot be written. An interruption is reported as [`Cancelled`].
@@ -58,19 +113,20 @@ pub fn finish(
     mut job: PreparedJob,
     counts: TileCounts,
     destination: &Destination<'_>,
-    record: &ReadTile<'_>,
+    tiles: &impl FileTiles,
 ) -> Result<RecoverReport> {
     job.findings.add(messages::defective_pixels(counts.defects));
     job.findings.add(messages::overexposure(counts.overexposed));
     job.findings.check(inputs.options.strict)?;
     let writer = LtmWriter {
+        tiles,
         destination,
         job: &job,
         quality: inputs.options.quality(),
         levels: inputs.levels,
     };
     let metadata = job.metadata(&inputs.shots, inputs.options.method())?;
-    let written = writer.write(&metadata, record)?;
+    let written = writer.write(&metadata)?;
     Ok(RecoverReport::new(start, inputs, &job, counts, &written))
 }
 
@@ -81,22 +137,23 @@ pub struct WrittenFile {
     pub snr: Option<Decibels>,
 }
 
-impl LtmWriter<'_> {
-    /// Encodes the tiles that `record` reads, and writes the file. An interruption is reported as [`Cancelled`].
-    fn write(&self, metadata: &Metadata, record: &ReadTile<'_>) -> Result<WrittenFile> {
+impl<T: FileTiles> LtmWriter<'_, T> {
+    /// Encodes the tiles and writes the file. An interruption is reported as [`Cancelled`].
+    fn write(&self, metadata: &Metadata) -> Result<WrittenFile> {
         let geometry = self.job.recovery.geometry();
         let (memory, rank) = (self.destination.memory, self.job.rank().unwrap_or(0));
         let encoders = encoders(memory, geometry, self.levels, rank)?;
-        thread_pool(encoders)?.install(|| self.write_within_limit(metadata, record))
+        thread_pool(encoders)?.install(|| self.write_within_limit(metadata))
     }
 
-    fn write_within_limit(
-        &self,
-        metadata: &Metadata,
-        record: &ReadTile<'_>,
-    ) -> Result<WrittenFile> {
+    fn write_within_limit(&self, metadata: &Metadata) -> Result<WrittenFile> {
         let _spinner = progress::spinner("compressing");
         let (levels, destination) = (self.levels, self.destination);
+        let input = WriterInput {
+            job: self.job,
+            metadata,
+            destination,
+        };
         let mut quality = self.quality;
         let max_bytes = match quality {
             FileQuality::MaxBytes(bytes) => bytes,
@@ -106,7 +163,7 @@ impl LtmWriter<'_> {
             quality = FileQuality::MaxBytes((LEVEL_0_SHARE * max_bytes as f64) as u64);
         }
         loop {
-            let file = self.encode(record, metadata.clone(), quality);
+            let file = self.tiles.encode(&input, quality);
             let file = file.map_err(|error| self.writing_error(error, max_bytes))?;
             let output = OutputFile::create(destination.output, &LTM)?;
             let written = output.finish(|out| match levels {
@@ -147,19 +204,6 @@ impl LtmWriter<'_> {
                 Err(error) => return Err(error),
             }
         }
-    }
-
-    /// Encodes the tiles as a file of one level, whose chunks are in a temporary file.
-    fn encode(
-        &self,
-        record: &ReadTile<'_>,
-        metadata: Metadata,
-        quality: FileQuality,
-    ) -> Result<EncodedFile<SpooledChunks<File>>, FormatError> {
-        let Destination { output, cores, .. } = *self.destination;
-        let new_store = || temporary_spool(output).map(SpooledChunks::new);
-        let recovery = &self.job.recovery;
-        export::encode_file(recovery, record, metadata, quality, cores, new_store)
     }
 
     /// The error with the name of the output; `max_bytes` is what the user asked for.

@@ -10,7 +10,8 @@ use super::origin::{FileOrigin, OriginInput};
 use super::preparation::{CapturePreparation, PreparationSettings, PreparedCapture};
 use crate::capture::{CaptureFolder, CodeStatistics, Manifest, Measurements, NoiseModel};
 use crate::export::{self, Provenance};
-use crate::format::Metadata;
+use crate::format::{CodingPlan, Metadata};
+use crate::job_executor::Executor;
 use crate::recover::{HoldoutValidation, Method, PreparedRecovery, TailEstimate};
 use crate::transport::{Basis, Correspondence, Decibels, Geometry};
 
@@ -30,6 +31,8 @@ pub struct PreparedJob {
     pub codes: CodeStatistics,
     pub findings: Findings,
     pub origin: FileOrigin,
+    /// `None` if all tiles are analysed before the file is encoded.
+    pub coding: Option<CodingPlan>,
 }
 
 impl PreparedJob {
@@ -58,6 +61,11 @@ impl PreparedJob {
         ready(&prepared.recovery)?;
         let expected_snr_db = prepared.expected_snr();
         let (recovery, measurements) = (prepared.recovery, &sample.measurements);
+        source.cores.check_cancelled()?;
+        let quality = inputs.options.quality();
+        let coding = export::plan_file(&recovery, measurements, quality, source.cores)
+            .context("the file cannot be planned")?;
+        source.cores.check_cancelled()?;
         let origin = FileOrigin::new(
             &OriginInput {
                 folder: inputs.folder,
@@ -81,6 +89,7 @@ impl PreparedJob {
             codes: sample.read.codes,
             findings,
             origin,
+            coding,
         };
         Ok((job, sample))
     }

@@ -1,6 +1,6 @@
 //! `learned.bin`: what is learned from a sample of the photographs, for all shards.
 //!
-//! The 8 bytes `LTMLRN01`, then two [records](crate::cli::records): the [`LearnedKey`] as JSON, and the
+//! The 8 bytes `LTMLRN02`, then two [records](crate::cli::records): the [`LearnedKey`] as JSON, and the
 //! [`PreparedJob`] as MessagePack, compressed by zstd.
 
 use std::io::Write;
@@ -17,7 +17,7 @@ use crate::cli::recover::checkpoint_key::PROGRAM;
 use crate::cli::recover::inputs::RecoveryInputs;
 use crate::cli::recover::prepared_job::PreparedJob;
 
-const MAGIC: [u8; 8] = *b"LTMLRN01";
+const MAGIC: [u8; 8] = *b"LTMLRN02";
 const LEARNED: FileSignature = FileSignature::of_own_name("what a recovery learned");
 const ZSTD_LEVEL: i32 = 3;
 /// Numbers of the records.

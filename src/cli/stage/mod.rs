@@ -11,12 +11,15 @@
 //! inputs stays, any other is written under a temporary name and renamed. Each names what it follows from, so that files of
 //! another plan are told.
 
+mod encoded_record;
 mod ingest;
 mod learned_file;
+mod pack_file;
 mod partial_shards;
 mod plan;
 mod shard;
-mod shard_pack;
+mod shard_packs;
+mod shard_tiles;
 pub(super) mod stage_folder;
 
 use std::path::PathBuf;
@@ -33,14 +36,15 @@ use self::learned_file::LearnedFile;
 use self::partial_shards::PartialShard;
 use self::plan::{Comparison, RecoveryPlan};
 use self::shard::Shard;
-use self::shard_pack::ShardPacks;
+use self::shard_packs::{EncodedTiles, ShardPack, ShardPacks};
+use self::shard_tiles::ShardTiles;
 use self::stage_folder::StageFolder;
 use super::output_file::{LTM, OutputFile};
 use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
 use super::recover::args::{DEFAULT_MEMORY, RecoveryOptions};
 use super::recover::capture_sample::SampleSource;
-use super::recover::inputs::{RecoveryInputs, encoding_memory};
-use super::recover::ltm_writer::{Destination, finish};
+use super::recover::inputs::{RecoveryInputs, encoders, encoding_memory};
+use super::recover::ltm_writer::{Destination, RecoveredTiles, finish};
 use super::recover::prepared_job::PreparedJob;
 use super::recover::tile_recovery::{TilePhotographs, TileRecovery};
 use super::report::{print_json, print_line};
@@ -262,16 +266,26 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
     StageFolder::create(&args.folders.folder)?;
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
     let LearnedFile { id, job } = LearnedFile::read(&stages, &plan, &inputs)?;
-    let key = args.shard.key(&id, job.recovery.geometry());
+    let geometry = job.recovery.geometry();
+    let key = args.shard.pack_key(&id, &job);
     let path = stages.pack(args.shard);
+    let verify = || ShardPack::open(&path, &key, "");
     let print_complete = || print_line(&format!("{}: is complete", path.display()));
-    let sink = PartialShard::open(&stages, args.shard, &key)?;
-    if is_complete(shard_pack::verify(&path, &key))? {
+    let recovered = args.shard.recovered_key(&id, geometry);
+    let sink = PartialShard::open(&stages, args.shard, &recovered)?;
+    if is_complete(verify())? {
         sink.remove()?;
         return print_complete();
     }
-    let window = job.recovery.geometry().window;
-    let memory = inputs.tiles_memory_plan(args.memory, window)?;
+    let memory = inputs.tiles_memory_plan(args.memory, geometry.window)?;
+    // Before the long work.
+    let encoders = match &job.coding {
+        Some(_) => {
+            let rank = job.rank().unwrap_or(0);
+            encoders(encoding_memory(args.memory), geometry, 1, rank)?
+        }
+        None => 1,
+    };
     sink.print_count();
     let source = SampleSource {
         plan: &memory,
@@ -280,19 +294,25 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
     let recover = || {
         let photographs = TilePhotographs::of_capture(&capture, &job)?;
         let recovery = TileRecovery { job: &job, source };
-        recovery.run(photographs, key.tile_rows(), &sink)
+        recovery.run(photographs, args.shard.tile_rows(geometry), &sink)
     };
     let finished = thread_pool(memory.tiles_at_once())?
         .install(recover)
         .and_then(|counts| {
             // A plan that has changed meanwhile has packs of its own.
             stages.check_learned(&id, &LearnedFile::read_id(&stages)?)?;
-            shard_pack::write(&path, &key, counts, |tile| sink.read(tile))
+            let tiles = ShardTiles {
+                job: &job,
+                recovered: &sink,
+                cores,
+            };
+            let write = || pack_file::write(&path, &key, counts, |add| tiles.write(&key, add));
+            thread_pool(encoders)?.install(write)
         });
     if let Err(error) = finished {
         // Another process may have finished the shard, and removed the partial packs.
-        return match shard_pack::verify(&path, &key) {
-            Ok(()) => {
+        return match verify() {
+            Ok(_) => {
                 sink.remove()?;
                 print_complete()
             }
@@ -319,15 +339,29 @@ fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
     let LearnedFile { id, mut job } = LearnedFile::read(&stages, &plan, &inputs)?;
     job.findings.print_further();
-    let packs = ShardPacks::open(&stages, &id, job.recovery.geometry(), args.shards)?;
+    let packs = ShardPacks::open(&stages, &id, &job, args.shards, cores)?;
     let destination = Destination {
         output: &args.output,
         memory: encoding_memory(args.memory),
         cores,
         too_large_remedy: TOO_LARGE_REMEDY,
     };
-    let record = |i| packs.read(i);
-    let report = finish(start, &inputs, job, packs.counts(), &destination, &record)?;
+    let counts = packs.counts();
+    let report = match job.coding.clone() {
+        Some(plan) => {
+            let tiles = EncodedTiles {
+                packs: &packs,
+                plan: &plan,
+                cores,
+            };
+            finish(start, &inputs, job, counts, &destination, &tiles)?
+        }
+        None => {
+            let record = |i| packs.read(i);
+            let tiles = RecoveredTiles(&record);
+            finish(start, &inputs, job, counts, &destination, &tiles)?
+        }
+    };
     match args.json {
         true => print_json(&report),
         false => report.print(&args.output, capture.manifest()),

@@ -11,8 +11,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context, Error, Result};
 
-use super::shard::{Shard, ShardKey};
-use super::shard_pack::{KEY, MAGIC, PackContent, TilePlace};
+use super::pack_file::{PackContent, PackKey, TilePlace, beginning};
+use super::shard::Shard;
 use super::stage_folder::StageFolder;
 use crate::cli::output_file::{temporary_beside, without_path};
 use crate::cli::process_resources::Interrupted;
@@ -28,7 +28,7 @@ pub struct PartialShard {
     /// What the names of its partial packs begin with.
     stem: String,
     shards: PathBuf,
-    key: ShardKey,
+    key: PackKey,
     tiles: Mutex<PartialTiles>,
 }
 
@@ -59,7 +59,7 @@ impl PartialShard {
     ///
     /// # Errors
     /// If a file cannot be read.
-    pub fn open(stages: &StageFolder, shard: Shard, key: &ShardKey) -> Result<Self> {
+    pub fn open(stages: &StageFolder, shard: Shard, key: &PackKey) -> Result<Self> {
         let learned: String = key.learned.chars().take(ID_DIGITS).collect();
         let (stem, shards) = (format!("{}.{learned}.", shard.file_stem()), stages.shards());
         let mut others = Vec::new();
@@ -188,7 +188,7 @@ impl TileSink for PartialShard {
 
 impl OwnPack {
     /// Creates a partial pack with this key, under a name of its own that begins with `stem`.
-    fn create(shards: &Path, stem: &str, key: &ShardKey) -> Result<Self> {
+    fn create(shards: &Path, stem: &str, key: &PackKey) -> Result<Self> {
         let beside = shards.join(stem);
         let (mut builder, folder) = temporary_beside(&beside, 0o666);
         let file = builder.prefix(stem).suffix(".partial").tempfile_in(folder);
@@ -198,7 +198,7 @@ impl OwnPack {
             .context("cannot be created; may you write there?")
             .with_context(|| format!("{}*.partial", beside.display()))?;
         let mut own = Self { path, file, end: 0 };
-        own.append(&[&MAGIC[..], &encode_record(KEY, &serde_json::to_vec(key)?)?].concat())?;
+        own.append(&beginning(key)?)?;
         Ok(own)
     }
 

@@ -3,10 +3,10 @@
 use std::fmt;
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
-
+use super::pack_file::{PackKey, TileKind};
 use crate::cli::recover::checkpoint_key::PROGRAM;
-use crate::export::FILE_TILE_SIDE;
+use crate::cli::recover::prepared_job::PreparedJob;
+use crate::export::{self, FILE_TILE_SIDE};
 use crate::transport::Geometry;
 
 /// Most shards of a recovery.
@@ -53,48 +53,57 @@ impl Shard {
         format!("{}-of-{}", self.number, self.count)
     }
 
-    /// What its tiles depend on, if `learned` identifies what was learned.
-    pub fn key(self, learned: &str, geometry: &Geometry) -> ShardKey {
-        let grid = geometry.tile_grid();
-        let tiles_per_row = FILE_TILE_SIDE / geometry.tile_side;
-        let file_rows = u64::from(grid.height.div_ceil(tiles_per_row));
-        let row = |number: u32| {
-            let file_row = u64::from(number) * file_rows / u64::from(self.count);
-            (file_row as u32 * tiles_per_row).min(grid.height)
-        };
-        let [start, end] = [row(self.number - 1), row(self.number)];
-        ShardKey {
+    /// Its rows of recovered tiles.
+    pub fn tile_rows(self, geometry: &Geometry) -> Range<u32> {
+        let [start, end] = self
+            .file_tile_rows(geometry)
+            .map(|row| (row * tiles_per_row(geometry)).min(geometry.tile_grid().height));
+        start..end
+    }
+
+    /// The first of its rows of the file's tiles, and the first of the next shard.
+    fn file_tile_rows(self, geometry: &Geometry) -> [u32; 2] {
+        let rows = geometry.tile_grid().height;
+        let rows = u64::from(rows.div_ceil(tiles_per_row(geometry)));
+        let row = |number: u32| (u64::from(number) * rows / u64::from(self.count)) as u32;
+        [row(self.number - 1), row(self.number)]
+    }
+
+    /// What its recovered tiles depend on, if `learned` identifies what was learned.
+    pub fn recovered_key(self, learned: &str, geometry: &Geometry) -> PackKey {
+        let (rows, columns) = (self.tile_rows(geometry), geometry.tile_grid().width);
+        PackKey {
             program: PROGRAM.to_owned(),
             learned: learned.to_owned(),
-            tiles: start * grid.width..end * grid.width,
-            columns: grid.width,
+            kind: TileKind::Recovered,
+            tiles: rows.start * columns..rows.end * columns,
         }
     }
+
+    /// What its pack depends on: that of encoded tiles if a plan says how to encode them.
+    pub fn pack_key(self, learned: &str, job: &PreparedJob) -> PackKey {
+        let key = self.recovered_key(learned, job.recovery.geometry());
+        if job.coding.is_none() {
+            return key;
+        }
+        let columns = export::file_geometry(&job.recovery).tile_grid().width;
+        let [start, end] = self.file_tile_rows(job.recovery.geometry());
+        PackKey {
+            kind: TileKind::Encoded,
+            tiles: start * columns..end * columns,
+            ..key
+        }
+    }
+}
+
+/// Rows of recovered tiles in a row of the file's tiles.
+fn tiles_per_row(geometry: &Geometry) -> u32 {
+    FILE_TILE_SIDE / geometry.tile_side
 }
 
 impl fmt::Display for Shard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}/{}", self.number, self.count)
-    }
-}
-
-/// What the tiles of a shard depend on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ShardKey {
-    /// Name and version of the program.
-    pub program: String,
-    /// SHA-256 of what was learned.
-    pub learned: String,
-    /// Indices of its tiles, row by row. None if there are more shards than rows of the file's tiles.
-    pub tiles: Range<u32>,
-    /// Tiles in a row.
-    columns: u32,
-}
-
-impl ShardKey {
-    /// Its rows of tiles.
-    pub fn tile_rows(&self) -> Range<u32> {
-        self.tiles.start / self.columns..self.tiles.end / self.columns
     }
 }
 
@@ -116,9 +125,9 @@ mod tests {
         for count in [1, 2, 3, 5, 6, 7, 256] {
             let mut next = 0;
             for shard in Shard::all(count) {
-                let key = shard.key("", &geometry);
+                let key = shard.recovered_key("", &geometry);
                 assert_eq!(key.tiles.start, next);
-                let rows = key.tile_rows();
+                let rows = shard.tile_rows(&geometry);
                 assert_eq!(rows.start % 4, 0);
                 assert_eq!(rows.len() as u32 * grid.width, key.tiles.len() as u32);
                 next = key.tiles.end;

@@ -2,6 +2,8 @@
 //!
 //! Content of the frame: e `[function]` as u8, then all codes as [byte planes](super::byte_planes).
 
+use serde::{Deserialize, Serialize};
+
 use super::byte_planes::{join, split, unzigzag, zigzag};
 use super::zstd_frame::{compress, decompress};
 use crate::format::error::{FormatError, SectionError, damaged};
@@ -16,7 +18,7 @@ pub fn content_bytes(functions: usize, area: usize) -> usize {
 }
 
 /// Basis functions, each rounded to multiples of a power of two.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct QuantisedBasis {
     exponents: Vec<u8>,
     codes: Vec<i16>,

@@ -55,19 +55,29 @@ pub struct QuantisedRun<'a> {
 pub trait EncodableRuns {
     /// Calls `visit` with each run of `items`, quantised to `step`.
     fn for_runs(&self, items: Range<usize>, step: f32, visit: &mut dyn FnMut(QuantisedRun<'_>));
+}
 
-    /// Bytes of the token strings of `items`.
-    ///
-    /// # Errors
-    /// [`FormatError::Compress`].
-    fn compressed_bytes(&self, items: Range<usize>, step: f32) -> Result<usize, FormatError> {
-        let mut strings = [TokenWriter::default(), TokenWriter::default()];
-        self.for_runs(items, step, &mut |run| {
+/// Bytes of the token strings of `items` of some tiles, as if they were one.
+///
+/// # Errors
+/// [`FormatError::Compress`].
+pub fn compressed_bytes<'a>(
+    tiles: impl Iterator<Item = &'a dyn EncodableRuns>,
+    items: Range<usize>,
+    step: f32,
+) -> Result<usize, FormatError> {
+    let mut tiles = tiles.peekable();
+    if tiles.peek().is_none() {
+        return Ok(0);
+    }
+    let mut strings = [TokenWriter::default(), TokenWriter::default()];
+    for runs in tiles {
+        runs.for_runs(items.clone(), step, &mut |run| {
             strings[run.string].write_run(run.numbers);
         });
-        let [main, side] = strings.map(TokenWriter::finish);
-        Ok(main?.bytes.len() + side?.bytes.len())
     }
+    let [main, side] = strings.map(TokenWriter::finish);
+    Ok(main?.bytes.len() + side?.bytes.len())
 }
 
 /// Calls `visit` with the tokens of a run: the index of the number that each ends at, its context, the token

@@ -3,7 +3,10 @@
 use std::borrow::Cow;
 use std::io::Write;
 
+use serde::{Deserialize, Serialize};
+
 use super::basis_rotation::BasisRotation;
+use super::encoder_input::EncoderInput;
 use super::scan_plan::SHARES;
 use super::source_analysis::{AnalysedSource, for_tiles, non_empty};
 use crate::format::checksum::checksum;
@@ -14,17 +17,18 @@ use crate::format::codec::direct_functions::{self, QuantisedDirectFunctions};
 use crate::format::codec::half_float_codec;
 use crate::format::codec::transform_encoder::QuantisedCoefficients;
 use crate::format::error::FormatError;
+use crate::format::extension::FormatExtension;
 use crate::format::index::FileIndex;
-use crate::format::metadata::MetadataText;
+use crate::format::metadata::{Metadata, MetadataText};
 use crate::format::scan::{ProgressiveScan, ScanCoding};
 use crate::job_executor::Executor;
-use crate::transport::{Basis, Decibels, FloatTile, SnrAccumulator};
+use crate::transport::{Basis, Decibels, FloatTile, Geometry, SnrAccumulator};
 
 /// Share of the error that the rounding of the basis may add.
 const BASIS_ERROR_SHARE: f64 = 0.02;
 /// Relative squared error of half-precision floats: 74 dB. Few values may have none, or six times as much;
 /// the file claims no less, and the basis is not finer.
-const HALVES_ERROR_RATIO: f64 = 4e-8;
+pub const HALVES_ERROR_RATIO: f64 = 4e-8;
 
 /// A file ready to be written.
 #[derive(Clone, Debug)]
@@ -48,6 +52,28 @@ impl<S: ChunkStore> EncodedFile<S> {
     /// SNR against the source; `None` if it is dark.
     pub fn snr(&self) -> Option<Decibels> {
         self.index.scans.last().map(|scan| scan.snr)
+    }
+
+    /// A file of the chunks in `chunks`, whose `entries` are `[scan, tile]`.
+    ///
+    /// # Errors
+    /// Those of writing extensions and metadata.
+    pub(super) fn indexed(
+        geometry: Geometry,
+        scans: Vec<ProgressiveScan>,
+        entries: Vec<ChunkEntry>,
+        extensions: Vec<FormatExtension>,
+        metadata: &Metadata,
+        chunks: S,
+    ) -> Result<Self, FormatError> {
+        let metadata = MetadataText::encode(metadata)?;
+        let (index, index_bytes) =
+            FileIndex::encode(geometry, scans, entries, extensions, metadata)?;
+        Ok(Self {
+            index,
+            index_bytes,
+            chunks,
+        })
     }
 
     /// Writes the file.
@@ -81,20 +107,43 @@ pub struct QuantisedTile {
 
 /// A tile's chunks `[scan]`, and its squared error after each scan.
 #[derive(Default)]
-struct EncodedTile {
-    chunks: Vec<EncodedChunk>,
-    errors: Vec<f64>,
+pub struct TileChunks {
+    pub chunks: Vec<EncodedChunk>,
+    pub errors: Vec<f64>,
+}
+
+impl TileChunks {
+    /// Encodes a tile over the file's basis, of which the first `rank` functions count, by `scans`; `order` is that of slots.
+    ///
+    /// # Errors
+    /// [`FormatError::Compress`].
+    pub fn new(
+        tile: &FloatTile,
+        rank: usize,
+        order: &[u16],
+        scans: &[ProgressiveScan],
+    ) -> Result<Self, FormatError> {
+        let is_lossless = |scan: &ProgressiveScan| {
+            matches!(scan.coding, ScanCoding::Halves | ScanCoding::DirectHalves)
+        };
+        match scans.iter().any(is_lossless) {
+            true => encode_halves(tile, rank, order, scans),
+            false => QuantisedTile::new(tile, rank, order, scans, false).encode(scans),
+        }
+    }
 }
 
 impl QuantisedTile {
-    /// Quantises a tile over the file's basis; `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
+    /// Quantises a tile over the file's basis, of which the first `rank` functions count; `order` is that of slots.
+    /// `keep_decoded` says whether [`decoded`](Self::decoded) will be called.
     pub fn new(
-        analysed: &AnalysedSource<'_, impl Executor>,
         tile: &FloatTile,
+        rank: usize,
+        order: &[u16],
         scans: &[ProgressiveScan],
         keep_decoded: bool,
     ) -> Self {
-        let (extent, rank, order) = (tile.rect.extent, analysed.rank(), &analysed.order);
+        let extent = tile.rect.extent;
         let (coefficients, functions) = (non_empty(&tile.coefficients), non_empty(&tile.functions));
         Self {
             coefficients: coefficients
@@ -126,7 +175,7 @@ impl QuantisedTile {
         }
     }
 
-    fn encode(&self, scans: &[ProgressiveScan]) -> Result<EncodedTile, FormatError> {
+    fn encode(&self, scans: &[ProgressiveScan]) -> Result<TileChunks, FormatError> {
         let coefficients = self.coefficients.as_ref().map(|q| q.chunks(scans));
         let functions = self.functions.as_ref().map(|q| q.chunks(scans));
         let mut chunks = vec![EncodedChunk::default(); scans.len()];
@@ -139,43 +188,22 @@ impl QuantisedTile {
         }
         let klt_error = self.coefficients.as_ref().map_or(0.0, |q| q.klt_error);
         let errors = (1..=scans.len()).map(|scans| self.error(scans).error + klt_error);
-        Ok(EncodedTile {
+        Ok(TileChunks {
             chunks,
             errors: errors.collect(),
         })
     }
 }
 
-/// Encodes all tiles by quantising scans.
-///
-/// # Errors
-/// As [`EncodedFile::new`].
-pub fn encode_quantised<S: ChunkStore>(
-    analysed: &AnalysedSource<'_, impl Executor>,
-    scans: Vec<ProgressiveScan>,
-    store: S,
-) -> Result<EncodedFile<S>, FormatError> {
-    let encode = |tile: FloatTile| {
-        QuantisedTile::new(analysed, &analysed.rotated(tile), &scans, false).encode(&scans)
-    };
-    assemble(analysed, scans.clone(), encode, store)
-}
-
-/// Encodes all tiles as half-precision floats.
-///
-/// # Errors
-/// As [`EncodedFile::new`].
-pub fn encode_lossless<S: ChunkStore>(
-    analysed: &AnalysedSource<'_, impl Executor>,
-    store: S,
-) -> Result<EncodedFile<S>, FormatError> {
+/// The scans of all tiles as half-precision floats.
+pub fn lossless_scans(analysed: &AnalysedSource<'_, impl Executor>) -> Vec<ProgressiveScan> {
     // A rotated coefficient is at most the norm of the input coefficients.
     let gains = (0..analysed.rank()).filter_map(|k| Some(analysed.rotation.as_ref()?.gain(k)));
-    let input_rank = analysed.source.basis.map_or(0, Basis::rank);
+    let input_rank = analysed.basis.map_or(0, Basis::rank);
     let gain = gains.fold((input_rank as f64).sqrt(), f64::max) as f32;
     let peak = (analysed.coefficient_peak * gain).max(analysed.function_peak);
     let step = half_float_codec::step_for(peak);
-    let side = analysed.source.geometry.tile_side;
+    let side = analysed.geometry.tile_side;
     let max_per_scan = direct_functions::max_slots(side) as usize;
     let (rank, slots) = (analysed.rank(), analysed.slots());
     // All items have the same bytes.
@@ -202,22 +230,21 @@ pub fn encode_lossless<S: ChunkStore>(
             first += count;
         }
     }
-    let encode = |tile: FloatTile| encode_halves(analysed, &analysed.rotated(tile), &scans);
-    assemble(analysed, scans.clone(), encode, store)
+    scans
 }
 
 fn encode_halves(
-    analysed: &AnalysedSource<'_, impl Executor>,
     tile: &FloatTile,
+    rank: usize,
+    order: &[u16],
     scans: &[ProgressiveScan],
-) -> Result<EncodedTile, FormatError> {
-    let mut encoded = EncodedTile::default();
+) -> Result<TileChunks, FormatError> {
+    let mut encoded = TileChunks::default();
     let (mut energies, mut errors) = (Vec::new(), Vec::new());
     for scan in scans {
-        let order = &analysed.order;
         let values = match scan.coding.is_direct() {
             true => half_float_codec::gather(&tile.functions, order.len(), scan, Some(order)),
-            false => half_float_codec::gather(&tile.coefficients, analysed.rank(), scan, None),
+            false => half_float_codec::gather(&tile.coefficients, rank, scan, None),
         };
         let energy = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
         energies.push(energy);
@@ -238,77 +265,159 @@ fn encode_halves(
     Ok(encoded)
 }
 
-/// Rounds the basis so that the rounding adds its share to `error`.
-fn quantise_basis(rotation: &BasisRotation, area: usize, error: f64) -> QuantisedBasis {
-    let steps = rotation.energies.iter().map(|energy| {
-        let error = BASIS_ERROR_SHARE * error / rotation.rank() as f64;
-        (12.0 * error / (area as f64 * energy.max(f64::MIN_POSITIVE))).sqrt() as f32
-    });
-    QuantisedBasis::new(&rotation.basis.kernels, &steps.collect::<Vec<_>>())
+/// Basis functions, rounded so that the rounding adds its share to `error`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RoundedBasis {
+    functions: QuantisedBasis,
+    /// `[component]`: squared error of a function.
+    errors: Vec<f64>,
 }
 
-/// Encodes all tiles by `encode`, and puts the file together.
-fn assemble<S: ChunkStore>(
+impl RoundedBasis {
+    pub fn new(rotation: &BasisRotation, error: f64) -> Self {
+        let kernels = &rotation.basis.kernels;
+        let area = kernels.first().map_or(0, Vec::len);
+        let steps = rotation.energies.iter().map(|energy| {
+            let error = BASIS_ERROR_SHARE * error / rotation.rank() as f64;
+            (12.0 * error / (area as f64 * energy.max(f64::MIN_POSITIVE))).sqrt() as f32
+        });
+        let functions = QuantisedBasis::new(kernels, &steps.collect::<Vec<_>>());
+        let errors = kernels.iter().enumerate();
+        let errors = errors.map(|(k, kernel)| functions.error(k, kernel));
+        Self {
+            errors: errors.collect(),
+            functions,
+        }
+    }
+
+    /// Adds the lengths and checksums of the basis chunks to `scans`. Returns the chunks, `[scan]`, empty where a scan has no
+    /// new functions.
+    ///
+    /// # Errors
+    /// [`FormatError::Compress`].
+    pub fn chunks(
+        &self,
+        area: usize,
+        scans: &mut [ProgressiveScan],
+    ) -> Result<Vec<Vec<u8>>, FormatError> {
+        let mut known = 0;
+        let chunks = scans.iter_mut().map(|scan| {
+            let functions = scan.new_basis_functions(known);
+            if functions == 0 {
+                return Ok(Vec::new());
+            }
+            let bytes = self.functions.encode(known, functions, area)?;
+            known += functions;
+            scan.basis_bytes = bytes.len() as u32; // below 2^24
+            scan.basis_crc = checksum(&bytes);
+            Ok(bytes)
+        });
+        chunks.collect()
+    }
+
+    /// Squared errors that the rounding adds after each scan, for coefficients of these `energies`, `[component]`.
+    pub fn errors(&self, energies: &[f64], scans: &[ProgressiveScan]) -> Vec<f64> {
+        let (mut known, mut error) = (0, 0.0);
+        let errors = scans.iter().map(|scan| {
+            let new = known..known + scan.new_basis_functions(known);
+            known = new.end;
+            for k in new {
+                error += energies[k] * self.errors[k];
+            }
+            error
+        });
+        errors.collect()
+    }
+}
+
+/// The entry of a chunk in the directory.
+pub fn chunk_entry(chunk: &EncodedChunk) -> ChunkEntry {
+    ChunkEntry {
+        bytes: chunk.bytes.len() as u32, // below 2^25
+        content_bytes: chunk.content_bytes,
+        crc: checksum(&chunk.bytes),
+    }
+}
+
+/// Encodes all tiles by `scans`, and puts the file together.
+///
+/// # Errors
+/// As [`EncodedFile::new`].
+pub fn encode<S: ChunkStore>(
+    source: &EncoderInput<'_>,
     analysed: &AnalysedSource<'_, impl Executor>,
     mut scans: Vec<ProgressiveScan>,
-    encode: impl Fn(FloatTile) -> Result<EncodedTile, FormatError> + Sync + Send,
     mut store: S,
 ) -> Result<EncodedFile<S>, FormatError> {
-    let (source, rotation) = (&analysed.source, analysed.rotation.as_ref());
+    let rotation = analysed.rotation.as_ref();
     let geometry = &source.geometry;
-    let (tiles, area) = (geometry.tile_grid().area(), geometry.window.area());
+    let tiles = geometry.tile_grid().area();
     let mut entries = vec![ChunkEntry::default(); scans.len() * tiles];
     // Every prefix lacks the dropped components.
     let kept = rotation.map_or(0.0, BasisRotation::energy);
     let mut errors = vec![(analysed.coefficient_energy - kept).max(0.0); scans.len()];
+    let encode = |tile: FloatTile| {
+        let tile = analysed.rotated(tile);
+        TileChunks::new(&tile, analysed.rank(), &analysed.order, &scans)
+    };
     for_tiles(source, analysed.executor, encode, |i, tile| {
         let tile = tile?;
         for (sum, error) in errors.iter_mut().zip(&tile.errors) {
             *sum += error;
         }
         for (scan, chunk) in tile.chunks.into_iter().enumerate() {
-            entries[scan * tiles + i] = ChunkEntry {
-                bytes: chunk.bytes.len() as u32, // below 2^25
-                content_bytes: chunk.content_bytes,
-                crc: checksum(&chunk.bytes),
-            };
+            entries[scan * tiles + i] = chunk_entry(&chunk);
             if !chunk.bytes.is_empty() {
                 store.put(scan * (tiles + 1) + i + 1, chunk.bytes)?;
             }
         }
         Ok(())
     })?;
-    let error = errors.last().copied().unwrap_or(0.0);
-    let basis = rotation.map(|rotation| (rotation, quantise_basis(rotation, area, error)));
-    let (mut known, mut basis_error) = (0, 0.0);
-    for (number, (scan, error)) in scans.iter_mut().zip(errors).enumerate() {
-        let functions = scan.new_basis_functions(known);
-        if let Some((rotation, quantised)) = &basis
-            && functions > 0
-        {
-            let bytes = quantised.encode(known, functions, area)?;
-            for k in known..known + functions {
-                basis_error +=
-                    rotation.energies[k] * quantised.error(k, &rotation.basis.kernels[k]);
-            }
-            known += functions;
-            scan.basis_bytes = bytes.len() as u32; // below 2^24
-            scan.basis_crc = checksum(&bytes);
-            store.put(number * (tiles + 1), bytes)?;
+    if let Some(rotation) = rotation {
+        let basis = RoundedBasis::new(rotation, errors.last().copied().unwrap_or(0.0));
+        put_basis(
+            basis.chunks(geometry.window.area(), &mut scans)?,
+            tiles,
+            &mut store,
+        )?;
+        let basis_errors = basis.errors(&rotation.energies, &scans);
+        for (sum, error) in errors.iter_mut().zip(basis_errors) {
+            *sum += error;
         }
+    }
+    set_snrs(&mut scans, analysed.energy, &errors);
+    let extensions = source.extensions.clone();
+    EncodedFile::indexed(
+        geometry.clone(),
+        scans,
+        entries,
+        extensions,
+        &source.metadata,
+        store,
+    )
+}
+
+/// Puts the basis chunks, `[scan]`, of a file of so many `tiles` into its store.
+pub fn put_basis(
+    chunks: Vec<Vec<u8>>,
+    tiles: usize,
+    store: &mut impl ChunkStore,
+) -> Result<(), FormatError> {
+    for (scan, bytes) in chunks.into_iter().enumerate() {
+        if !bytes.is_empty() {
+            store.put(scan * (tiles + 1), bytes)?;
+        }
+    }
+    Ok(())
+}
+
+/// Gives each scan the SNR of the squared `error` after it, against the `energy` of the source.
+pub fn set_snrs(scans: &mut [ProgressiveScan], energy: f64, errors: &[f64]) {
+    for (scan, &error) in scans.iter_mut().zip(errors) {
         let error = SnrAccumulator {
-            signal: analysed.energy,
-            error: error + basis_error,
+            signal: energy,
+            error,
         };
         scan.snr = Decibels(f64::from(error.finite_snr().0 as f32));
     }
-    let extensions = source.extensions.clone();
-    let metadata = MetadataText::encode(&source.metadata)?;
-    let (index, index_bytes) =
-        FileIndex::encode(geometry.clone(), scans, entries, extensions, metadata)?;
-    Ok(EncodedFile {
-        index,
-        index_bytes,
-        chunks: store,
-    })
 }

@@ -1,6 +1,8 @@
 //! The basis of a file: an orthonormal basis of the recovered basis's span, whose first function alone
 //! responds to a flat light, and whose others are the principal components of the coefficients.
 
+use serde::{Deserialize, Serialize};
+
 use crate::linalg::{mirror_upper, multiply, symmetric_eigen, transpose, vectorise};
 use crate::transport::{Basis, CHANNELS, FloatTile};
 
@@ -11,7 +13,7 @@ const MIN_EIGENVALUE_RATIO: f64 = 1e-9;
 ///
 /// Function 0 is the projection of the constant function on the span: a flat light sees component 0 and no other, so
 /// that errors of the others do not show under it. The other functions are principal components, the strongest first.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BasisRotation {
     pub basis: Basis,
     /// Sum of squared coefficients of each component.

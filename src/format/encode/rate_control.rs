@@ -73,10 +73,9 @@ impl EncodedFile {
         step: f32,
         executor: &impl Executor,
     ) -> Result<Self, FormatError> {
-        let analysed = AnalysedSource::new(source, executor)?;
-        let mut controller = RateController::new(analysed, || Ok(Vec::new()))?;
-        let is_lit = controller.trial_error(step).signal > 0.0;
-        controller.encode_with_step(is_lit.then_some(step))
+        let mut encoder = FileEncoder::new(&source, || Ok(Vec::new()), executor)?;
+        let is_lit = encoder.controller.trial_error(step).signal > 0.0;
+        encoder.encode_with_step(is_lit.then_some(step))
     }
 }
 
@@ -95,77 +94,56 @@ impl<S: ChunkStore> EncodedFile<S> {
         target: EncodingTarget<'_>,
         executor: &impl Executor,
     ) -> Result<Self, FormatError> {
-        let analysed = AnalysedSource::new(source, executor)?;
-        let controller = |analysed| RateController::new(analysed, &new_store);
+        if let EncodingTarget::Lossless = target {
+            let analysed = AnalysedSource::new(&source, executor)?;
+            let scans = assembly::lossless_scans(&analysed);
+            return assembly::encode(&source, &analysed, scans, new_store()?);
+        }
+        let mut encoder = FileEncoder::new(&source, new_store, executor)?;
         match target {
-            EncodingTarget::Snr(snr) => controller(analysed)?.encode_to_snr(snr),
-            EncodingTarget::Bytes(limit) => controller(analysed)?.encode_to_size(limit),
-            EncodingTarget::Loss(loss, metric) => {
-                controller(analysed)?.encode_to_loss(loss, metric)
+            EncodingTarget::Bytes(limit) => encoder.encode_to_size(limit),
+            target => {
+                let step = encoder.controller.step(target)?;
+                encoder.encode_with_step(step)
             }
-            EncodingTarget::Lossless => assembly::encode_lossless(&analysed, new_store()?),
         }
     }
 }
 
-/// The search for a file's step and rank.
-struct RateController<'a, E, N> {
-    analysed: AnalysedSource<'a, E>,
-    sample: Vec<SampledTilePart>,
+/// Encodes all tiles of a source with a step, or with several until the target is reached.
+struct FileEncoder<'a, E, N> {
+    source: &'a EncoderInput<'a>,
+    controller: RateController<'a, E>,
     new_store: N,
 }
 
-impl<'a, E, S, N> RateController<'a, E, N>
+impl<'a, E, S, N> FileEncoder<'a, E, N>
 where
     E: Executor,
     S: ChunkStore,
     N: Fn() -> Result<S, FormatError> + Sync,
 {
-    fn new(analysed: AnalysedSource<'a, E>, new_store: N) -> Result<Self, FormatError> {
-        let sample = sample(&analysed)?;
+    fn new(
+        source: &'a EncoderInput<'a>,
+        new_store: N,
+        executor: &'a E,
+    ) -> Result<Self, FormatError> {
+        let analysed = AnalysedSource::new(source, executor)?;
+        let sample = sample(&analysed, source)?;
         Ok(Self {
-            analysed,
-            sample,
+            source,
+            controller: RateController { analysed, sample },
             new_store,
         })
     }
 
-    fn encode_to_snr(&mut self, snr: Decibels) -> Result<EncodedFile<S>, FormatError> {
-        self.encode_with_step(step_for(snr, |step| self.trial_error(step)))
-    }
-
-    fn encode_to_loss(
-        &mut self,
-        max_loss: Decibels,
-        metric: &dyn DistortionMetric,
-    ) -> Result<EncodedFile<S>, FormatError> {
-        let analysed = &mut self.analysed;
-        let pixels = analysed.source.geometry.camera.area() as f64;
-        // The step at which nothing is left.
-        let coarsest = 16.0 * (analysed.energy / pixels).sqrt();
-        if !(coarsest as f32).is_normal() {
-            return self.encode_with_step(None);
-        }
-        let tiles = codable(analysed, metric.tiles());
-        // The metric may have direct functions where the file has none.
-        let has_functions = analysed.has_functions;
-        analysed.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
-        let tiles: Vec<_> = tiles.into_iter().map(|t| analysed.rotated(t)).collect();
-        let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
-            let scans = scan_plan::trial(analysed, (coarsest * exp2(exponent)) as f32);
-            let decoded = |i: usize| decoded(analysed, &tiles[i], &scans);
-            let loss = metric.loss(&analysed.executor.map(tiles.len(), decoded));
-            Ok::<_, FormatError>(loss.0 <= max_loss.0)
-        })?;
-        analysed.has_functions = has_functions;
-        self.encode_with_step(Some((coarsest * exp2(exponent)) as f32))
-    }
-
     fn encode_to_size(&mut self, limit: u64) -> Result<EncodedFile<S>, FormatError> {
-        let rotation = self.analysed.rotation.clone();
+        let rotation = self.controller.analysed.rotation.clone();
         let mut try_snr = |snr: f64| {
-            self.analysed.rotation.clone_from(&rotation);
-            self.encode_to_snr(Decibels(snr))
+            let controller = &mut self.controller;
+            controller.analysed.rotation.clone_from(&rotation);
+            let step = controller.step(EncodingTarget::Snr(Decibels(snr)))?;
+            self.encode_with_step(step)
         };
         let mut best = try_snr(SIZE_SNRS[0])?;
         let smallest = best.bytes();
@@ -186,16 +164,18 @@ where
     /// Encodes all tiles; without a step there is no light. Plans anew with smaller shares if the file exceeds
     /// [`MAX_SHARES`]: predictions from samples may err.
     fn encode_with_step(&mut self, step: Option<f32>) -> Result<EncodedFile<S>, FormatError> {
+        let controller = &mut self.controller;
         let Some(step) = step else {
-            return assembly::encode_quantised(&self.analysed, Vec::new(), (self.new_store)()?);
+            let store = (self.new_store)()?;
+            return assembly::encode(self.source, &controller.analysed, Vec::new(), store);
         };
-        let expected = self.trial_error(step);
-        drop_weak_components(&mut self.analysed, expected);
-        let model = RateDistortionModel::new(&self.analysed, &self.sample);
+        let expected = controller.drop_weak_components(step);
+        let model = RateDistortionModel::new(&controller.analysed, &controller.sample);
         let encode = |factor: f64| {
             let ProgressiveScanPlan { scans, first_scans } =
-                self.plan(&model, step, expected.error, factor)?;
-            let file = assembly::encode_quantised(&self.analysed, scans, (self.new_store)()?)?;
+                controller.plan(&model, step, expected.error, factor)?;
+            let store = (self.new_store)()?;
+            let file = assembly::encode(self.source, &controller.analysed, scans, store)?;
             let is_within = is_within_shares(&file, first_scans);
             Ok::<_, FormatError>((file, is_within))
         };
@@ -209,10 +189,67 @@ where
         }
         Ok(file)
     }
+}
+
+/// The search for a file's step, rank and scans.
+pub struct RateController<'a, E> {
+    pub analysed: AnalysedSource<'a, E>,
+    pub sample: Vec<SampledTilePart>,
+}
+
+impl<E: Executor> RateController<'_, E> {
+    /// The step for an SNR or a loss; `None` if there is no light.
+    ///
+    /// # Errors
+    /// Those of the metric.
+    pub fn step(&mut self, target: EncodingTarget<'_>) -> Result<Option<f32>, FormatError> {
+        match target {
+            EncodingTarget::Loss(max_loss, metric) => self.step_for_loss(max_loss, metric),
+            EncodingTarget::Snr(snr) => Ok(step_for(snr, |step| self.trial_error(step))),
+            EncodingTarget::Bytes(_) | EncodingTarget::Lossless => Ok(None),
+        }
+    }
+
+    fn step_for_loss(
+        &mut self,
+        max_loss: Decibels,
+        metric: &dyn DistortionMetric,
+    ) -> Result<Option<f32>, FormatError> {
+        let analysed = &mut self.analysed;
+        let pixels = analysed.geometry.camera.area() as f64;
+        // The step at which nothing is left.
+        let coarsest = 16.0 * (analysed.energy / pixels).sqrt();
+        if !(coarsest as f32).is_normal() {
+            return Ok(None);
+        }
+        let tiles = codable(analysed, metric.tiles());
+        // The metric may have direct functions where the file has none.
+        let has_functions = analysed.has_functions;
+        analysed.has_functions |= tiles.iter().any(|tile| !tile.functions.is_empty());
+        let tiles: Vec<_> = tiles.into_iter().map(|t| analysed.rotated(t)).collect();
+        let [exponent, _] = bisect(LOSS_EXPONENTS, LOSS_HALVINGS, |exponent| {
+            let scans = scan_plan::trial(analysed, (coarsest * exp2(exponent)) as f32);
+            let decoded = |i: usize| decoded(analysed, &tiles[i], &scans);
+            let loss = metric.loss(&analysed.executor.map(tiles.len(), decoded));
+            Ok::<_, FormatError>(loss.0 <= max_loss.0)
+        })?;
+        analysed.has_functions = has_functions;
+        Ok(Some((coarsest * exp2(exponent)) as f32))
+    }
+
+    /// Drops the last components, as far as their energy is small against the error of `step`. Returns this error.
+    pub fn drop_weak_components(&mut self, step: f32) -> SnrAccumulator {
+        let expected = self.trial_error(step);
+        drop_weak_components(&mut self.analysed, expected);
+        expected
+    }
 
     /// The plan for `factor` of the planned shares, with a step near `step` at which its error is `expected_error`: the
     /// plan's layers change the error a little.
-    fn plan(
+    ///
+    /// # Errors
+    /// [`FormatError::Compress`].
+    pub fn plan(
         &self,
         model: &RateDistortionModel,
         mut step: f32,
@@ -242,10 +279,11 @@ where
     }
 
     /// The quantisation error of some scans, predicted from the sample.
-    fn error_of(&self, scans: &[ProgressiveScan]) -> SnrAccumulator {
+    pub fn error_of(&self, scans: &[ProgressiveScan]) -> SnrAccumulator {
         let errors = self.analysed.executor.map(self.sample.len(), |i| {
             let SampledTilePart { tile, weight } = &self.sample[i];
-            let error = QuantisedTile::new(&self.analysed, tile, scans, false).error(scans.len());
+            let (rank, order) = (self.analysed.rank(), &self.analysed.order);
+            let error = QuantisedTile::new(tile, rank, order, scans, false).error(scans.len());
             SnrAccumulator {
                 signal: error.signal * weight,
                 error: error.error * weight,
@@ -280,12 +318,10 @@ fn codable(
     mut tiles: Vec<FloatTile>,
 ) -> Vec<FloatTile> {
     if analysed.rotation.is_none()
-        && let Some(basis) = analysed.source.basis
+        && let Some(basis) = analysed.basis
     {
         for tile in &mut tiles {
-            *tile = tile
-                .functions(&analysed.source.geometry, Some(basis))
-                .into();
+            *tile = tile.functions(analysed.geometry, Some(basis)).into();
         }
     }
     tiles
@@ -297,10 +333,10 @@ fn decoded(
     tile: &FloatTile,
     scans: &[ProgressiveScan],
 ) -> TileTransportFunctions {
-    let quantised = QuantisedTile::new(analysed, tile, scans, true);
+    let quantised = QuantisedTile::new(tile, analysed.rank(), &analysed.order, scans, true);
     let decoded = quantised.decoded(tile, &analysed.order);
     let basis = analysed.rotation.as_ref().map(|rotation| &rotation.basis);
-    decoded.functions(&analysed.source.geometry, basis)
+    decoded.functions(analysed.geometry, basis)
 }
 
 /// Drops the last components, as far as their energy is small against the quantisation error.

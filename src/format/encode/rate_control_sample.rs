@@ -2,6 +2,7 @@
 
 use std::io;
 
+use super::encoder_input::EncoderInput;
 use super::source_analysis::AnalysedSource;
 use crate::format::error::FormatError;
 use crate::job_executor::Executor;
@@ -27,12 +28,13 @@ pub struct SampledTilePart {
 /// [`FormatError::Source`] if a tile cannot be read.
 pub fn sample(
     analysed: &AnalysedSource<'_, impl Executor>,
+    source: &EncoderInput<'_>,
 ) -> Result<Vec<SampledTilePart>, FormatError> {
     let lit_tiles = &analysed.lit_tiles;
     let pixel_bytes = ((analysed.rank() + analysed.slots()) * CHANNELS * size_of::<f32>()).max(1);
     let max_count = MAX_SAMPLE_BYTES / (PART_SIDE.pow(2) as usize * pixel_bytes);
     let count = max_count.clamp(1, MAX_SAMPLED_TILES).min(lit_tiles.len());
-    let tile_side = analysed.source.geometry.tile_side;
+    let tile_side = analysed.geometry.tile_side;
     let side = (MAX_SAMPLE_BYTES / (count.max(1) * pixel_bytes)).isqrt() as u32;
     let side = match side >= tile_side {
         true => tile_side,
@@ -42,7 +44,7 @@ pub fn sample(
         // One of each of `count` equal groups, at a pseudo-random place that follows no grid.
         let [from, to] = [n, n + 1].map(|n| n * lit_tiles.len() / count);
         let tile = lit_tiles[from + hash(n) % (to - from)];
-        let tile = (analysed.source.tile)(tile)?;
+        let tile = (source.tile)(tile)?;
         let (tile, lit_parts) = lit_part(tile, side, hash(n + MAX_SAMPLED_TILES));
         Ok(SampledTilePart {
             tile: analysed.rotated(tile),

@@ -6,7 +6,7 @@
 use super::rate_control_sample::SampledTilePart;
 use super::source_analysis::{AnalysedSource, non_empty};
 use crate::format::codec::direct_functions::CentreOutDirectFunctions;
-use crate::format::codec::tokens::{CONTEXTS, EncodableRuns, for_tokens};
+use crate::format::codec::tokens::{CONTEXTS, EncodableRuns, compressed_bytes, for_tokens};
 use crate::format::codec::transform_encoder::TransformedTile;
 use crate::format::error::FormatError;
 use crate::format::scan::{ProgressiveScan, ScanCoding};
@@ -25,6 +25,8 @@ pub struct RateDistortion {
 /// The sample's values as the codecs quantise them.
 pub struct RateDistortionModel {
     parts: Vec<TransformedTilePart>,
+    /// Number of parts that are compressed together.
+    parts_per_chunk: usize,
 }
 
 struct TransformedTilePart {
@@ -41,6 +43,7 @@ struct EntropyToken {
 }
 
 impl RateDistortionModel {
+    /// Of parts that are as large as tiles, or nearly.
     pub fn new(analysed: &AnalysedSource<'_, impl Executor>, sample: &[SampledTilePart]) -> Self {
         let parts = analysed.executor.map(sample.len(), |i| {
             let SampledTilePart { tile, weight } = &sample[i];
@@ -53,7 +56,26 @@ impl RateDistortionModel {
                 functions: functions.map(|tau| CentreOutDirectFunctions::new(tau, &analysed.order)),
             }
         });
-        Self { parts }
+        Self {
+            parts,
+            parts_per_chunk: 1,
+        }
+    }
+
+    /// Of parts that are much smaller than tiles, and equally heavy. As many as fill a tile are compressed together, as their
+    /// values would be.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn of_squares(
+        analysed: &AnalysedSource<'_, impl Executor>,
+        sample: &[SampledTilePart],
+    ) -> Self {
+        let area = |part: &SampledTilePart| part.tile.rect.extent.area();
+        let tile = (analysed.geometry.tile_side as usize).pow(2);
+        let largest = sample.iter().map(area).max().unwrap_or(tile);
+        Self {
+            parts_per_chunk: (tile / largest.max(1)).max(1),
+            ..Self::new(analysed, sample)
+        }
     }
 
     /// Compressed bytes of a scan.
@@ -65,10 +87,11 @@ impl RateDistortionModel {
         scan: &ProgressiveScan,
         executor: &impl Executor,
     ) -> Result<f64, FormatError> {
-        let bytes = executor.map(self.parts.len(), |i| {
-            let runs = self.parts[i].runs(scan.coding);
-            let bytes = runs.map_or(Ok(0), |runs| runs.compressed_bytes(scan.items(), scan.step));
-            Ok(self.parts[i].weight * bytes? as f64)
+        let chunks: Vec<_> = self.parts.chunks(self.parts_per_chunk).collect();
+        let bytes = executor.map(chunks.len(), |i| {
+            let runs = chunks[i].iter().filter_map(|part| part.runs(scan.coding));
+            let bytes = compressed_bytes(runs, scan.items(), scan.step)?;
+            Ok(chunks[i][0].weight * bytes as f64)
         });
         bytes.into_iter().sum()
     }

@@ -49,6 +49,10 @@ const TRIAL_FIRST_ITEMS: usize = 5;
 const MAX_FIRST_STEP_EXPONENT: f64 = 12.0;
 const FIRST_STEP_TRIALS: usize = 6;
 
+/// Ratio of steps of a scan for values that are only expected, not in the sample. It is nearly the largest whose rounding errors
+/// do not overflow, so that the scan has nothing but such values.
+const OUTLIER_STEP_RATIO: f32 = 8192.0;
+
 /// Bytes of a basis function in a basis chunk, for each slot.
 const BASIS_BYTES_PER_SLOT: f64 = 1.2;
 
@@ -76,18 +80,25 @@ struct CodingItems {
     max_per_scan: usize,
     /// `[item]`: the finest step at which its numbers do not overflow.
     finest_steps: Vec<f32>,
+    /// The least ratio of the step of a scan against overflow to that of the scan after it.
+    overflow_step_ratio: f32,
 }
 
 impl CodingItems {
     /// Components and slots of a source, where there are some.
     fn of(analysed: &AnalysedSource<'_, impl Executor>) -> Vec<Self> {
-        let side = analysed.source.geometry.tile_side;
+        let side = analysed.geometry.tile_side;
+        let overflow_step_ratio = match analysed.expected_peaks {
+            Some(_) => OUTLIER_STEP_RATIO,
+            None => 1.0,
+        };
         let components = Self {
             coding: ScanCoding::Transform,
             max_per_scan: transform::max_components(side) as usize,
             finest_steps: (0..analysed.rank())
                 .map(|k| analysed.finest_step(k))
                 .collect(),
+            overflow_step_ratio,
         };
         let slots = Self {
             coding: ScanCoding::Direct,
@@ -96,6 +107,7 @@ impl CodingItems {
                 direct_functions::finest_step(analysed.function_peak);
                 analysed.slots()
             ],
+            overflow_step_ratio,
         };
         let mut kinds = Vec::from([components, slots]);
         kinds.retain(|items| items.count() > 0);
@@ -137,7 +149,8 @@ impl CodingItems {
     ) {
         let finest = self.finest_step(coded..self.count());
         if finest > step {
-            self.layer(coded, &bytes[coded..], [finest; 2], f64::INFINITY, scans);
+            let coarse = finest.max(self.overflow_step_ratio * step);
+            self.layer(coded, &bytes[coded..], [coarse; 2], f64::INFINITY, scans);
         }
         let steps = [step * LAST_FLAT_STEP_RATIO, step];
         self.layer(0, bytes, steps, max_bytes, scans);

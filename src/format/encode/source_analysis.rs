@@ -1,4 +1,4 @@
-//! The encoder's view of a source: the rotated basis, energies and peaks, from one pass over all tiles.
+//! The encoder's view of a source: the rotated basis, energies and peaks, from one pass over all tiles or from a sample.
 
 use super::basis_rotation::{BasisRotation, coefficient_moments};
 use super::encoder_input::EncoderInput;
@@ -7,14 +7,16 @@ use crate::format::constants::MAX_RANK;
 use crate::format::error::FormatError;
 use crate::format::memory_budget::MemoryBudget;
 use crate::job_executor::Executor;
-use crate::transport::{Basis, CHANNELS, FloatTile};
+use crate::transport::{Basis, CHANNELS, FloatTile, Geometry};
 
 /// Number of tiles that are encoded at a time.
 const BATCH_TILES: usize = 64;
 
 /// A source whose tiles have been analysed.
 pub struct AnalysedSource<'a, E> {
-    pub source: EncoderInput<'a>,
+    pub geometry: &'a Geometry,
+    /// The basis of the source's coefficients.
+    pub basis: Option<&'a Basis>,
     pub executor: &'a E,
     /// The rotation to the file's basis; `None` if there are no coefficients.
     pub rotation: Option<BasisRotation>,
@@ -29,18 +31,26 @@ pub struct AnalysedSource<'a, E> {
     pub order: Vec<u16>,
     /// Numbers of the tiles that are not dark.
     pub lit_tiles: Vec<usize>,
+    /// If the statistics are a sample's: the largest magnitudes that are expected in the picture, `[component]`.
+    pub expected_peaks: Option<Vec<f32>>,
 }
 
-/// What the encoder needs to know of one tile.
-struct TileStatistics {
-    moments: Vec<f64>,
-    function_energy: f64,
-    coefficient_peak: f32,
-    function_peak: f32,
+/// Sums and peaks of tiles.
+#[derive(Default)]
+pub struct SourceStatistics {
+    /// Of coefficients, `[rank, rank]`.
+    pub moments: Vec<f64>,
+    pub function_energy: f64,
+    pub coefficient_peak: f32,
+    pub function_peak: f32,
 }
 
-impl TileStatistics {
-    fn new(tile: &FloatTile, rank: usize, area: usize) -> Self {
+impl SourceStatistics {
+    /// Those of one tile with coefficients over `rank` functions of `area` slots.
+    ///
+    /// # Panics
+    /// If the tile has the wrong length.
+    pub fn of_tile(tile: &FloatTile, rank: usize, area: usize) -> Self {
         let pixels = tile.rect.extent.area();
         let fits = |length: usize, columns: usize| length == 0 || length == pixels * columns;
         assert!(
@@ -54,6 +64,24 @@ impl TileStatistics {
             coefficient_peak: peak(&tile.coefficients),
             function_peak: peak(&tile.functions),
         }
+    }
+
+    /// Multiplies the sums: those of a sample, by the number of pixels that each of its pixels stands for.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn scale(&mut self, factor: f64) {
+        self.moments.iter_mut().for_each(|m| *m *= factor);
+        self.function_energy *= factor;
+    }
+
+    /// Adds those of another tile.
+    pub fn add(&mut self, tile: &Self) {
+        self.moments.resize(tile.moments.len(), 0.0);
+        for (sum, m) in self.moments.iter_mut().zip(&tile.moments) {
+            *sum += m;
+        }
+        self.function_energy += tile.function_energy;
+        self.coefficient_peak = self.coefficient_peak.max(tile.coefficient_peak);
+        self.function_peak = self.function_peak.max(tile.function_peak);
     }
 }
 
@@ -71,15 +99,44 @@ impl<'a, E: Executor> AnalysedSource<'a, E> {
     /// Analyses all tiles of a source.
     ///
     /// # Errors
-    /// [`FormatError::InvalidGeometry`], [`FormatError::TooMany`] basis functions, and [`FormatError::Source`] if a tile
-    /// cannot be read.
+    /// Those of [`unlit`](Self::unlit), and [`FormatError::Source`] if a tile cannot be read.
     ///
     /// # Panics
     /// If a tile or a basis function has the wrong length.
-    pub fn new(source: EncoderInput<'a>, executor: &'a E) -> Result<Self, FormatError> {
-        let geometry = &source.geometry;
+    pub fn new(source: &'a EncoderInput<'a>, executor: &'a E) -> Result<Self, FormatError> {
+        let mut analysed = Self::unlit(&source.geometry, source.basis, executor)?;
+        let (rank, area) = (
+            source.basis.map_or(0, Basis::rank),
+            source.geometry.window.area(),
+        );
+        let mut sums = SourceStatistics::default();
+        let analyse = |tile: FloatTile| SourceStatistics::of_tile(&tile, rank, area);
+        let lit_tiles = &mut analysed.lit_tiles;
+        for_tiles(source, executor, analyse, |i, tile| {
+            if tile.coefficient_peak.max(tile.function_peak) > 0.0 {
+                lit_tiles.push(i);
+            }
+            sums.add(&tile);
+            Ok(())
+        })?;
+        analysed.set_statistics(&sums);
+        Ok(analysed)
+    }
+
+    /// A source without light.
+    ///
+    /// # Errors
+    /// [`FormatError::InvalidGeometry`], and [`FormatError::TooMany`] basis functions.
+    ///
+    /// # Panics
+    /// If a basis function has the wrong length.
+    pub fn unlit(
+        geometry: &'a Geometry,
+        basis: Option<&'a Basis>,
+        executor: &'a E,
+    ) -> Result<Self, FormatError> {
         geometry.check().map_err(FormatError::InvalidGeometry)?;
-        let rank = source.basis.map_or(0, Basis::rank);
+        let rank = basis.map_or(0, Basis::rank);
         if rank > usize::from(MAX_RANK) {
             return Err(FormatError::TooMany {
                 quantity: "basis functions",
@@ -87,45 +144,39 @@ impl<'a, E: Executor> AnalysedSource<'a, E> {
                 limit: MAX_RANK.into(),
             });
         }
-        let area = source.geometry.window.area();
-        if let Some(basis) = source.basis {
+        if let Some(basis) = basis {
+            let area = geometry.window.area();
             let fits = basis.kernels.iter().all(|kernel| kernel.len() == area);
             assert!(fits, "basis functions of the window's area");
         }
-        let mut moments = vec![0.0; rank * rank];
-        let (mut function_energy, mut coefficient_peak, mut function_peak) = (0.0, 0.0f32, 0.0f32);
-        let mut lit_tiles = Vec::new();
-        let analyse = |tile: FloatTile| TileStatistics::new(&tile, rank, area);
-        for_tiles(&source, executor, analyse, |i, tile| {
-            if tile.coefficient_peak.max(tile.function_peak) > 0.0 {
-                lit_tiles.push(i);
-            }
-            for (sum, m) in moments.iter_mut().zip(tile.moments) {
-                *sum += m;
-            }
-            function_energy += tile.function_energy;
-            coefficient_peak = coefficient_peak.max(tile.coefficient_peak);
-            function_peak = function_peak.max(tile.function_peak);
-            Ok(())
-        })?;
-        let basis = source.basis.filter(|_| moments.iter().any(|m| *m != 0.0));
-        let rotation = basis.and_then(|basis| BasisRotation::new(basis, &moments));
-        let coefficient_energy = rotation.as_ref().map_or(0.0, BasisRotation::energy);
+        let order = direct_functions::centre_out_order(geometry.window, &MemoryBudget::unlimited());
         Ok(Self {
-            order: direct_functions::centre_out_order(
-                source.geometry.window,
-                &MemoryBudget::unlimited(),
-            )?,
-            energy: coefficient_energy + function_energy,
-            coefficient_energy,
-            has_functions: function_energy > 0.0,
-            coefficient_peak,
-            function_peak,
-            source,
+            geometry,
+            basis,
             executor,
-            rotation,
-            lit_tiles,
+            rotation: None,
+            has_functions: false,
+            energy: 0.0,
+            coefficient_energy: 0.0,
+            coefficient_peak: 0.0,
+            function_peak: 0.0,
+            order: order?,
+            lit_tiles: Vec::new(),
+            expected_peaks: None,
         })
+    }
+
+    /// Rotates the basis, and takes energies and peaks.
+    pub fn set_statistics(&mut self, sums: &SourceStatistics) {
+        let basis = self
+            .basis
+            .filter(|_| sums.moments.iter().any(|m| *m != 0.0));
+        self.rotation = basis.and_then(|basis| BasisRotation::new(basis, &sums.moments));
+        self.coefficient_energy = self.rotation.as_ref().map_or(0.0, BasisRotation::energy);
+        self.energy = self.coefficient_energy + sums.function_energy;
+        self.has_functions = sums.function_energy > 0.0;
+        self.coefficient_peak = sums.coefficient_peak;
+        self.function_peak = sums.function_peak;
     }
 
     /// Number of components of the file.
@@ -152,8 +203,11 @@ impl<'a, E: Executor> AnalysedSource<'a, E> {
     /// be, or from the component's whole energy.
     pub fn finest_step(&self, k: usize) -> f32 {
         self.rotation.as_ref().map_or(0.0, |rotation| {
+            if let Some(peaks) = &self.expected_peaks {
+                return transform::finest_step(peaks[k], f64::INFINITY);
+            }
             let peak = f64::from(self.coefficient_peak) * rotation.gain(k);
-            let padding = transform::padding_factor(&self.source.geometry);
+            let padding = transform::padding_factor(self.geometry);
             transform::finest_step(peak as f32, padding * rotation.energies[k])
         })
     }

@@ -51,7 +51,7 @@ use nnls_blending::{BlendingGram, MIN_TILE_GAIN, TILE_CENTRE_SIDE_PX, fit_nnls_a
 pub(super) use posterior_means::NEIGHBOURHOOD_RADIUS as MAX_HALO;
 use training::FINAL_EM_ITERATIONS;
 #[cfg(not(target_arch = "wasm32"))]
-pub(super) use training::sample_regions;
+pub(super) use training::{MAX_REGIONS, REGION_SIDE_PX, sample_regions};
 pub(super) use training::{max_rank, preparation_bytes};
 
 /// The learned model and, where blending pays, non-negative least squares.

@@ -37,8 +37,8 @@ const RANK_COMPARISON_SAMPLING: usize = 2;
 /// EM iterations over the truncated basis, on the training regions: from the training patterns, and then from all.
 pub(super) const FINAL_EM_ITERATIONS: [usize; 2] = [2, 1];
 /// Training regions of the neighbour prior, and their side.
-const MAX_REGIONS: usize = 64;
-const REGION_SIDE_PX: u32 = 16;
+pub(in crate::recover) const MAX_REGIONS: usize = 64;
+pub(in crate::recover) const REGION_SIDE_PX: u32 = 16;
 /// Side of the middle of a region that decides whether the neighbour prior helps.
 const SELECTION_SIDE_PX: u32 = 8;
 /// Memory for the regions' Gram matrices. Where many windows differ, or saturated samples leave pixels Gram matrices of
