@@ -133,9 +133,8 @@ impl Recovered {
         let count = self.tiles.len();
         let encode = |(i, tile): (usize, &FloatTile)| {
             let encoded = encoder.encode(tile.clone()).unwrap();
-            for (scan, chunk) in encoded.chunks.into_iter().enumerate() {
-                store.put(scan * (count + 1) + i + 1, chunk).unwrap();
-            }
+            let chunks = encoded.chunks.into_iter();
+            store.put_tile(i, count, chunks).unwrap();
             encoded.head
         };
         let heads: Vec<_> = self.tiles.iter().enumerate().rev().map(encode).collect();

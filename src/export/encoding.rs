@@ -28,9 +28,6 @@ const DEFAULT_SNR: Decibels = Decibels(32.0);
 /// Camera pixels of a picture that is no larger than the sample, so that all of its tiles are analysed before one is encoded.
 #[cfg(not(target_arch = "wasm32"))]
 const MAX_WHOLLY_ANALYSED: usize = 1 << 14;
-/// Number of tiles that are encoded at a time.
-#[cfg(not(target_arch = "wasm32"))]
-const BATCH_TILES: usize = 64;
 
 /// The quality of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -83,10 +80,7 @@ pub fn encode_file<S: ChunkStore>(
     executor: &impl Executor,
     new_store: impl Fn() -> Result<S, FormatError> + Sync,
 ) -> Result<EncodedFile<S>, FormatError> {
-    let tile = |i| match executor.is_cancelled() {
-        true => Err(ErrorKind::Interrupted.into()),
-        false => file_tile(recovery, record, i),
-    };
+    let tile = |i| unless_cancelled(executor, || file_tile(recovery, record, i));
     let source = EncoderInput {
         geometry: file_geometry(recovery),
         basis: recovery.basis(),
@@ -155,9 +149,7 @@ pub fn encode_planned<S: ChunkStore>(
         executor,
         |tile, encoded| {
             heads.push(encoded.head);
-            let chunks = encoded.chunks.into_iter().enumerate();
-            let mut chunks = chunks.filter(|(_, bytes)| !bytes.is_empty());
-            chunks.try_for_each(|(scan, bytes)| store.put(scan * (tiles + 1) + tile + 1, bytes))
+            store.put_tile(tile, tiles, encoded.chunks.into_iter())
         },
     )?;
     EncodedFile::of_tiles(plan, geometry, heads.iter(), store, metadata)
@@ -174,25 +166,23 @@ pub fn for_encoded_tiles<E: From<FormatError>>(
     record: &(dyn Fn(usize) -> io::Result<Vec<u8>> + Sync),
     tiles: Range<usize>,
     executor: &impl Executor,
-    mut take: impl FnMut(usize, EncodedTile) -> Result<(), E>,
+    take: impl FnMut(usize, EncodedTile) -> Result<(), E>,
 ) -> Result<(), E> {
     let geometry = file_geometry(recovery);
     let encoder = TileEncoder::new(plan, &geometry, recovery.basis())?;
-    let encode = |i: usize| match executor.is_cancelled() {
-        true => Err(FormatError::Source(ErrorKind::Interrupted.into())),
-        false => {
-            let tile = file_tile(recovery, record, i);
-            encoder.encode(tile.map_err(FormatError::Source)?)
-        }
-    };
-    for first in tiles.clone().step_by(BATCH_TILES) {
-        let count = BATCH_TILES.min(tiles.end - first);
-        let encoded = executor.map(count, |i| encode(first + i));
-        for (i, tile) in encoded.into_iter().enumerate() {
-            take(first + i, tile?)?;
-        }
+    let tile = |i| unless_cancelled(executor, || file_tile(recovery, record, i));
+    encoder.encode_each(tiles, tile, executor, take)
+}
+
+/// What `read` gives, or [`ErrorKind::Interrupted`] once the executor is cancelled.
+fn unless_cancelled<T>(
+    executor: &impl Executor,
+    read: impl FnOnce() -> io::Result<T>,
+) -> io::Result<T> {
+    match executor.is_cancelled() {
+        true => Err(ErrorKind::Interrupted.into()),
+        false => read(),
     }
-    Ok(())
 }
 
 /// The geometry of the file, whose tiles are larger than those of `recovery`.

@@ -11,6 +11,21 @@ pub struct ChunkId {
     pub tile: Option<usize>,
 }
 
+impl ChunkId {
+    /// Its number in the order of a file with so many `tiles`, empty chunks counted.
+    pub fn number(self, tiles: usize) -> usize {
+        self.scan * (tiles + 1) + self.tile.map_or(0, |tile| tile + 1)
+    }
+
+    /// The chunk with a [`number`](Self::number).
+    pub fn of_number(number: usize, tiles: usize) -> Self {
+        Self {
+            scan: number / (tiles + 1),
+            tile: (number % (tiles + 1)).checked_sub(1),
+        }
+    }
+}
+
 impl std::fmt::Display for ChunkId {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let scan = self.scan;

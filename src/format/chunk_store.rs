@@ -6,6 +6,7 @@ use std::io::{Read, Seek, Write};
 #[cfg(not(target_arch = "wasm32"))]
 use std::ops::Range;
 
+use super::chunk::ChunkId;
 use super::error::FormatError;
 #[cfg(not(target_arch = "wasm32"))]
 use super::spool::Spool;
@@ -17,6 +18,28 @@ pub trait ChunkStore {
     /// # Errors
     /// [`FormatError::Spool`].
     fn put(&mut self, number: usize, bytes: Vec<u8>) -> Result<(), FormatError>;
+
+    /// Keeps the chunks of `tile`, `[scan]`, in a file with so many `tiles`. Those that are empty are left out.
+    ///
+    /// # Errors
+    /// Those of [`put`](Self::put).
+    fn put_tile(
+        &mut self,
+        tile: usize,
+        tiles: usize,
+        chunks: impl Iterator<Item = Vec<u8>>,
+    ) -> Result<(), FormatError>
+    where
+        Self: Sized,
+    {
+        for (scan, bytes) in chunks.enumerate() {
+            let tile = Some(tile);
+            if !bytes.is_empty() {
+                self.put(ChunkId { scan, tile }.number(tiles), bytes)?;
+            }
+        }
+        Ok(())
+    }
 
     /// Chunk number `number`; empty if none was kept.
     ///

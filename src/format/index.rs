@@ -247,15 +247,11 @@ impl FileIndex {
 
     /// The chunk's number in file order, empty chunks counted.
     pub(super) fn chunk_number(&self, chunk: ChunkId) -> usize {
-        chunk.scan * (self.tiles() + 1) + chunk.tile.map_or(0, |tile| tile + 1)
+        chunk.number(self.tiles())
     }
 
     fn chunk_id(&self, number: usize) -> ChunkId {
-        let chunks = self.tiles() + 1;
-        ChunkId {
-            scan: number / chunks,
-            tile: (number % chunks).checked_sub(1),
-        }
+        ChunkId::of_number(number, self.tiles())
     }
 }
 

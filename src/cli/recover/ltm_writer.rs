@@ -96,8 +96,7 @@ impl FileTiles for RecoveredTiles<'_> {
 /// Writes the file of a recovery.
 struct LtmWriter<'a, T> {
     tiles: &'a T,
-    destination: &'a Destination<'a>,
-    job: &'a PreparedJob,
+    input: WriterInput<'a>,
     quality: FileQuality,
     /// Number of levels of the file.
     levels: u32,
@@ -118,15 +117,19 @@ pub fn finish(
     job.findings.add(messages::defective_pixels(counts.defects));
     job.findings.add(messages::overexposure(counts.overexposed));
     job.findings.check(inputs.options.strict)?;
+    let metadata = job.metadata(&inputs.shots, inputs.options.method())?;
+    let input = WriterInput {
+        job: &job,
+        metadata: &metadata,
+        destination,
+    };
     let writer = LtmWriter {
         tiles,
-        destination,
-        job: &job,
+        input,
         quality: inputs.options.quality(),
         levels: inputs.levels,
     };
-    let metadata = job.metadata(&inputs.shots, inputs.options.method())?;
-    let written = writer.write(&metadata)?;
+    let written = writer.write()?;
     Ok(RecoverReport::new(start, inputs, &job, counts, &written))
 }
 
@@ -139,21 +142,19 @@ pub struct WrittenFile {
 
 impl<T: FileTiles> LtmWriter<'_, T> {
     /// Encodes the tiles and writes the file. An interruption is reported as [`Cancelled`].
-    fn write(&self, metadata: &Metadata) -> Result<WrittenFile> {
-        let geometry = self.job.recovery.geometry();
-        let (memory, rank) = (self.destination.memory, self.job.rank().unwrap_or(0));
+    fn write(&self) -> Result<WrittenFile> {
+        let WriterInput {
+            job, destination, ..
+        } = self.input;
+        let geometry = job.recovery.geometry();
+        let (memory, rank) = (destination.memory, job.rank().unwrap_or(0));
         let encoders = encoders(memory, geometry, self.levels, rank)?;
-        thread_pool(encoders)?.install(|| self.write_within_limit(metadata))
+        thread_pool(encoders)?.install(|| self.write_within_limit())
     }
 
-    fn write_within_limit(&self, metadata: &Metadata) -> Result<WrittenFile> {
+    fn write_within_limit(&self) -> Result<WrittenFile> {
         let _spinner = progress::spinner("compressing");
-        let (levels, destination) = (self.levels, self.destination);
-        let input = WriterInput {
-            job: self.job,
-            metadata,
-            destination,
-        };
+        let (levels, destination) = (self.levels, self.input.destination);
         let mut quality = self.quality;
         let max_bytes = match quality {
             FileQuality::MaxBytes(bytes) => bytes,
@@ -163,7 +164,7 @@ impl<T: FileTiles> LtmWriter<'_, T> {
             quality = FileQuality::MaxBytes((LEVEL_0_SHARE * max_bytes as f64) as u64);
         }
         loop {
-            let file = self.tiles.encode(&input, quality);
+            let file = self.tiles.encode(&self.input, quality);
             let file = file.map_err(|error| self.writing_error(error, max_bytes))?;
             let output = OutputFile::create(destination.output, &LTM)?;
             let written = output.finish(|out| match levels {
@@ -208,7 +209,7 @@ impl<T: FileTiles> LtmWriter<'_, T> {
 
     /// The error with the name of the output; `max_bytes` is what the user asked for.
     fn writing_error(&self, error: FormatError, max_bytes: u64) -> Error {
-        let output = self.destination.output.display();
+        let output = self.input.destination.output.display();
         match error {
             FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
             FormatError::TooLarge { limit, smallest } => {
@@ -218,7 +219,7 @@ impl<T: FileTiles> LtmWriter<'_, T> {
                 let limit = max_bytes;
                 Error::new(FormatError::TooLarge { limit, smallest }).context(format!(
                     "{output}: cannot be written; {}",
-                    self.destination.too_large_remedy
+                    self.input.destination.too_large_remedy
                 ))
             }
             other => Error::new(other).context(output.to_string()),

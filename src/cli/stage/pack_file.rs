@@ -35,7 +35,7 @@ const BUFFER_BYTES: usize = 1 << 18;
 pub struct PackKey {
     /// Name and version of the program.
     pub program: String,
-    /// SHA-256 of what was learned.
+    /// [`LearnedFile::id`](super::learned_file::LearnedFile::id).
     pub learned: String,
     pub kind: TileKind,
     /// Indices of its tiles, row by row, in the picture's tiles of this kind. None if there are more shards than rows of the
@@ -56,10 +56,10 @@ pub enum TileKind {
 /// Where a tile's bytes are in a file.
 pub type TilePlace = Range<u64>;
 
-/// What is wrong with a pack.
+/// A fault of a pack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PackFault {
-    /// It is of another shard or of what was learned otherwise.
+    /// It is of another shard, or of another `learned.bin`.
     Foreign,
     Damaged,
 }
@@ -78,7 +78,7 @@ impl PackContent {
     /// Reads the records of `file` to the first that is not intact.
     ///
     /// # Errors
-    /// If the file cannot be read. What is wrong with its content is in the result.
+    /// If the file cannot be read. Faults of its content are in the result.
     pub fn read(file: &File, key: &PackKey) -> io::Result<Result<Self, PackFault>> {
         let bytes = file.metadata()?.len();
         let mut reader = BufReader::with_capacity(BUFFER_BYTES, file);

@@ -69,7 +69,7 @@ impl Shard {
         [row(self.number - 1), row(self.number)]
     }
 
-    /// What its recovered tiles depend on, if `learned` identifies what was learned.
+    /// The key of its recovered tiles; `learned` is the id of `learned.bin`.
     pub fn recovered_key(self, learned: &str, geometry: &Geometry) -> PackKey {
         let (rows, columns) = (self.tile_rows(geometry), geometry.tile_grid().width);
         PackKey {
@@ -80,7 +80,7 @@ impl Shard {
         }
     }
 
-    /// What its pack depends on: that of encoded tiles if a plan says how to encode them.
+    /// The key of its pack: of encoded tiles, if the job has a coding plan.
     pub fn pack_key(self, learned: &str, job: &PreparedJob) -> PackKey {
         let key = self.recovered_key(learned, job.recovery.geometry());
         if job.coding.is_none() {

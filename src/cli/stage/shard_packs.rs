@@ -18,7 +18,7 @@ use crate::cli::recover::ltm_writer::{FileTiles, WriterInput};
 use crate::cli::recover::prepared_job::PreparedJob;
 use crate::cli::recover::tile_recovery::{TileCounts, decompress_tile};
 use crate::export::{self, FileQuality};
-use crate::format::{ChunkStore, CodingPlan, EncodedFile, EncodedTileHead, FormatError};
+use crate::format::{ChunkId, ChunkStore, CodingPlan, EncodedFile, EncodedTileHead, FormatError};
 use crate::job_executor::Executor;
 
 /// A complete pack.
@@ -111,7 +111,7 @@ impl ShardPacks {
         Shard::all(count).map(open).collect::<Result<_>>().map(Self)
     }
 
-    /// What was counted in all shards.
+    /// The sums of the counts of all shards.
     pub fn counts(&self) -> TileCounts {
         let mut counts = TileCounts::default();
         self.0.iter().for_each(|pack| counts += pack.counts);
@@ -150,12 +150,13 @@ pub struct PackedChunks<'a> {
 impl ChunkStore for PackedChunks<'_> {
     /// Only basis chunks are not in a pack.
     fn put(&mut self, number: usize, bytes: Vec<u8>) -> Result<(), FormatError> {
-        self.basis.put(number / (self.tiles + 1), bytes)
+        self.basis
+            .put(ChunkId::of_number(number, self.tiles).scan, bytes)
     }
 
     fn get(&self, number: usize) -> Result<Cow<'_, [u8]>, FormatError> {
-        let (scan, tile) = (number / (self.tiles + 1), number % (self.tiles + 1));
-        let Some(tile) = tile.checked_sub(1) else {
+        let ChunkId { scan, tile } = ChunkId::of_number(number, self.tiles);
+        let Some(tile) = tile else {
             return self.basis.get(scan);
         };
         if self.cores.is_cancelled() {

@@ -19,7 +19,7 @@ use crate::format::codec::transform_encoder::QuantisedCoefficients;
 use crate::format::error::FormatError;
 use crate::format::extension::FormatExtension;
 use crate::format::index::FileIndex;
-use crate::format::metadata::{Metadata, MetadataText};
+use crate::format::metadata::MetadataText;
 use crate::format::scan::{ProgressiveScan, ScanCoding};
 use crate::job_executor::Executor;
 use crate::transport::{Basis, Decibels, FloatTile, Geometry, SnrAccumulator};
@@ -57,16 +57,15 @@ impl<S: ChunkStore> EncodedFile<S> {
     /// A file of the chunks in `chunks`, whose `entries` are `[scan, tile]`.
     ///
     /// # Errors
-    /// Those of writing extensions and metadata.
+    /// [`FormatError::TooMany`] bytes of extensions or metadata.
     pub(super) fn indexed(
         geometry: Geometry,
         scans: Vec<ProgressiveScan>,
         entries: Vec<ChunkEntry>,
         extensions: Vec<FormatExtension>,
-        metadata: &Metadata,
+        metadata: MetadataText,
         chunks: S,
     ) -> Result<Self, FormatError> {
-        let metadata = MetadataText::encode(metadata)?;
         let (index, index_bytes) =
             FileIndex::encode(geometry, scans, entries, extensions, metadata)?;
         Ok(Self {
@@ -79,7 +78,7 @@ impl<S: ChunkStore> EncodedFile<S> {
     /// Writes the file.
     ///
     /// # Errors
-    /// [`FormatError::Write`] and [`FormatError::Spool`].
+    /// [`FormatError::Write`], and those of the store.
     pub fn write(&self, out: &mut impl Write) -> Result<(), FormatError> {
         out.write_all(&self.index_bytes)
             .map_err(FormatError::Write)?;
@@ -93,7 +92,7 @@ impl<S: ChunkStore> EncodedFile<S> {
     /// The bytes of a chunk.
     ///
     /// # Errors
-    /// [`FormatError::Spool`].
+    /// Those of the store.
     pub fn chunk(&self, chunk: ChunkId) -> Result<Cow<'_, [u8]>, FormatError> {
         self.chunks.get(self.index.chunk_number(chunk))
     }
@@ -290,29 +289,33 @@ impl RoundedBasis {
         }
     }
 
-    /// Adds the lengths and checksums of the basis chunks to `scans`. Returns the chunks, `[scan]`, empty where a scan has no
-    /// new functions.
+    /// Puts the basis chunks of a file of this `geometry` into its store, and their lengths and checksums into `scans`.
     ///
     /// # Errors
-    /// [`FormatError::Compress`].
-    pub fn chunks(
+    /// [`FormatError::Compress`], and those of the store.
+    pub fn put_chunks(
         &self,
-        area: usize,
+        geometry: &Geometry,
         scans: &mut [ProgressiveScan],
-    ) -> Result<Vec<Vec<u8>>, FormatError> {
+        store: &mut impl ChunkStore,
+    ) -> Result<(), FormatError> {
+        let (tiles, area) = (geometry.tile_grid().area(), geometry.window.area());
         let mut known = 0;
-        let chunks = scans.iter_mut().map(|scan| {
+        for (number, scan) in scans.iter_mut().enumerate() {
             let functions = scan.new_basis_functions(known);
-            if functions == 0 {
-                return Ok(Vec::new());
+            if functions > 0 {
+                let bytes = self.functions.encode(known, functions, area)?;
+                known += functions;
+                scan.basis_bytes = bytes.len() as u32; // below 2^24
+                scan.basis_crc = checksum(&bytes);
+                let basis = ChunkId {
+                    scan: number,
+                    tile: None,
+                };
+                store.put(basis.number(tiles), bytes)?;
             }
-            let bytes = self.functions.encode(known, functions, area)?;
-            known += functions;
-            scan.basis_bytes = bytes.len() as u32; // below 2^24
-            scan.basis_crc = checksum(&bytes);
-            Ok(bytes)
-        });
-        chunks.collect()
+        }
+        Ok(())
     }
 
     /// Squared errors that the rounding adds after each scan, for coefficients of these `energies`, `[component]`.
@@ -362,28 +365,16 @@ pub fn encode<S: ChunkStore>(
     };
     for_tiles(source, analysed.executor, encode, |i, tile| {
         let tile = tile?;
-        for (sum, error) in errors.iter_mut().zip(&tile.errors) {
-            *sum += error;
+        add_errors(&mut errors, &tile.errors);
+        for (scan, chunk) in tile.chunks.iter().enumerate() {
+            entries[scan * tiles + i] = chunk_entry(chunk);
         }
-        for (scan, chunk) in tile.chunks.into_iter().enumerate() {
-            entries[scan * tiles + i] = chunk_entry(&chunk);
-            if !chunk.bytes.is_empty() {
-                store.put(scan * (tiles + 1) + i + 1, chunk.bytes)?;
-            }
-        }
-        Ok(())
+        store.put_tile(i, tiles, tile.chunks.into_iter().map(|chunk| chunk.bytes))
     })?;
     if let Some(rotation) = rotation {
         let basis = RoundedBasis::new(rotation, errors.last().copied().unwrap_or(0.0));
-        put_basis(
-            basis.chunks(geometry.window.area(), &mut scans)?,
-            tiles,
-            &mut store,
-        )?;
-        let basis_errors = basis.errors(&rotation.energies, &scans);
-        for (sum, error) in errors.iter_mut().zip(basis_errors) {
-            *sum += error;
-        }
+        basis.put_chunks(geometry, &mut scans, &mut store)?;
+        add_errors(&mut errors, &basis.errors(&rotation.energies, &scans));
     }
     set_snrs(&mut scans, analysed.energy, &errors);
     let extensions = source.extensions.clone();
@@ -392,23 +383,16 @@ pub fn encode<S: ChunkStore>(
         scans,
         entries,
         extensions,
-        &source.metadata,
+        MetadataText::encode(&source.metadata)?,
         store,
     )
 }
 
-/// Puts the basis chunks, `[scan]`, of a file of so many `tiles` into its store.
-pub fn put_basis(
-    chunks: Vec<Vec<u8>>,
-    tiles: usize,
-    store: &mut impl ChunkStore,
-) -> Result<(), FormatError> {
-    for (scan, bytes) in chunks.into_iter().enumerate() {
-        if !bytes.is_empty() {
-            store.put(scan * (tiles + 1), bytes)?;
-        }
+/// Adds squared errors, `[scan]`, to sums.
+pub fn add_errors(sums: &mut [f64], errors: &[f64]) {
+    for (sum, error) in sums.iter_mut().zip(errors) {
+        *sum += error;
     }
-    Ok(())
 }
 
 /// Gives each scan the SNR of the squared `error` after it, against the `energy` of the source.

@@ -1,11 +1,14 @@
 //! The coding plan: all that the encoder decides about a file, from a sample of its tiles. Tiles are then encoded one by one,
 //! in any order and on any machine.
 
+use std::io;
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::assembly::{
-    EncodedFile, HALVES_ERROR_RATIO, RoundedBasis, TileChunks, chunk_entry, lossless_scans,
-    put_basis, set_snrs,
+    EncodedFile, HALVES_ERROR_RATIO, RoundedBasis, TileChunks, add_errors, chunk_entry,
+    lossless_scans, set_snrs,
 };
 use super::basis_rotation::BasisRotation;
 use super::encoder_input::EncodingTarget;
@@ -13,13 +16,13 @@ use super::rate_control::RateController;
 use super::rate_control_sample::SampledTilePart;
 use super::scan_costs::RateDistortionModel;
 use super::scan_plan;
-use super::source_analysis::{AnalysedSource, SourceStatistics};
+use super::source_analysis::{AnalysedSource, SourceStatistics, energy, in_batches, peak};
 use crate::format::chunk::ChunkEntry;
 use crate::format::chunk_store::ChunkStore;
 use crate::format::codec::direct_functions;
 use crate::format::error::FormatError;
 use crate::format::memory_budget::MemoryBudget;
-use crate::format::metadata::Metadata;
+use crate::format::metadata::{Metadata, MetadataText};
 use crate::format::scan::ProgressiveScan;
 use crate::job_executor::Executor;
 use crate::transport::{Basis, CHANNELS, FloatTile, Geometry};
@@ -118,36 +121,27 @@ impl CodingPlan {
             weight,
         };
         let parts: Vec<SampledTilePart> = tiles.into_iter().map(rotated).collect();
-        let peak = |values: &mut dyn Iterator<Item = f32>| {
-            expected_peak(
-                values.fold(0.0, |peak, v| peak.max(v.abs())),
-                max_measurement,
-            )
-        };
         let components = analysed.rank();
-        let coefficients = || parts.iter().flat_map(|part| &part.tile.coefficients);
         let component_peak = |k: usize| {
-            let of_component = coefficients().skip(k).step_by(components);
-            peak(&mut of_component.flatten().copied())
+            let coefficients = parts.iter().flat_map(|part| &part.tile.coefficients);
+            let of_component = coefficients.skip(k).step_by(components);
+            expected_peak(peak(of_component), max_measurement)
         };
         let peaks: Vec<f32> = (0..components).map(component_peak).collect();
         analysed.coefficient_peak = peaks.iter().copied().fold(0.0, f32::max);
         analysed.expected_peaks = Some(peaks);
         let functions = parts.iter().flat_map(|part| &part.tile.functions);
-        analysed.function_peak = peak(&mut functions.flatten().copied());
+        analysed.function_peak = expected_peak(peak(functions), max_measurement);
         let whole = analysed.rotation.clone();
         let mut controller = RateController {
             analysed,
             sample: parts,
         };
-        let (mut scans, error) = plan_scans(&mut controller, target)?;
+        let (scans, error) = plan_scans(&mut controller, target)?;
         let analysed = &controller.analysed;
         let rotation = analysed.rotation.as_ref();
         let dropped = analysed.coefficient_energy - rotation.map_or(0.0, BasisRotation::energy);
         let basis = rotation.map(|rotation| RoundedBasis::new(rotation, error + dropped.max(0.0)));
-        if let Some(basis) = &basis {
-            basis.chunks(area, &mut scans)?;
-        }
         Ok(Self {
             scans,
             rank: analysed.rank(),
@@ -208,11 +202,6 @@ fn plan_scans(
     Ok((scans, error))
 }
 
-fn energy(value: &[f32; CHANNELS]) -> f64 {
-    let finite = value.iter().filter(|v| v.is_finite());
-    finite.map(|v| f64::from(*v).powi(2)).sum()
-}
-
 /// Encodes the tiles of a file by its plan.
 pub struct TileEncoder<'a> {
     plan: &'a CodingPlan,
@@ -256,7 +245,7 @@ impl<'a> TileEncoder<'a> {
         // What the plan leaves out is an error of every scan.
         let (mut signal, mut missing): (f64, f64) =
             (energies.iter().sum(), energies[plan.rank..].iter().sum());
-        let function_energy: f64 = tile.functions.iter().map(energy).sum();
+        let function_energy = energy(tile.functions.as_flattened());
         signal += function_energy;
         if !plan.has_functions {
             missing += function_energy;
@@ -266,9 +255,7 @@ impl<'a> TileEncoder<'a> {
             TileChunks::new(&tile, plan.rank, &self.order, &plan.scans)?;
         errors.iter_mut().for_each(|error| *error += missing);
         if let Some(basis) = &plan.basis {
-            let of_basis = basis.errors(&energies, &plan.scans);
-            let errors = errors.iter_mut().zip(of_basis);
-            errors.for_each(|(error, of_basis)| *error += of_basis);
+            add_errors(&mut errors, &basis.errors(&energies, &plan.scans));
         }
         Ok(EncodedTile {
             head: EncodedTileHead {
@@ -278,6 +265,21 @@ impl<'a> TileEncoder<'a> {
             },
             chunks: chunks.into_iter().map(|chunk| chunk.bytes).collect(),
         })
+    }
+
+    /// Encodes these `tiles`, which `tile` gives, and gives them to `take` in order.
+    ///
+    /// # Errors
+    /// [`FormatError::Source`] if a tile cannot be read, [`FormatError::Compress`], and those of `take`.
+    pub fn encode_each<E: From<FormatError>>(
+        &self,
+        tiles: Range<usize>,
+        tile: impl Fn(usize) -> io::Result<FloatTile> + Sync + Send,
+        executor: &impl Executor,
+        take: impl FnMut(usize, EncodedTile) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let encode = |i| self.encode(tile(i).map_err(FormatError::Source)?);
+        in_batches(tiles, executor, encode, take)
     }
 }
 
@@ -314,16 +316,15 @@ impl<S: ChunkStore> EncodedFile<S> {
                 entries[scan * tiles + count] = *entry;
             }
             signal += head.signal;
-            let sums = errors.iter_mut().zip(&head.errors);
-            sums.for_each(|(sum, error)| *sum += error);
+            add_errors(&mut errors, &head.errors);
             count += 1;
         }
         assert_eq!(count, tiles, "a head for each tile");
         if let Some(basis) = &plan.basis {
-            let chunks = basis.chunks(geometry.window.area(), &mut scans)?;
-            put_basis(chunks, tiles, &mut store)?;
+            basis.put_chunks(&geometry, &mut scans, &mut store)?;
         }
         set_snrs(&mut scans, signal, &errors);
+        let metadata = MetadataText::encode(metadata)?;
         Self::indexed(geometry, scans, entries, Vec::new(), metadata, store)
     }
 }

@@ -53,13 +53,9 @@ impl EncodedFile {
             }
         }
         let scans = index.scans.clone();
-        let (index, index_bytes) =
-            FileIndex::encode(geometry, scans, entries, extensions, metadata)?;
-        Ok(Self {
-            index,
-            index_bytes,
-            chunks,
-        })
+        Ok(Self::indexed(
+            geometry, scans, entries, extensions, metadata, chunks,
+        )?)
     }
 
     /// The file with other extensions and metadata.
@@ -75,18 +71,14 @@ impl EncodedFile {
         let tiles = 0..self.index.tiles();
         let entries = (0..scans.len()).flat_map(|scan| tiles.clone().map(move |tile| (scan, tile)));
         let entries = entries.map(|(scan, tile)| self.index.entry(scan, tile));
-        let (index, index_bytes) = FileIndex::encode(
+        Self::indexed(
             header.geometry.clone(),
             scans.clone(),
             entries.collect(),
             extensions,
             metadata,
-        )?;
-        Ok(Self {
-            index,
-            index_bytes,
-            chunks: self.chunks,
-        })
+            self.chunks,
+        )
     }
 }
 

@@ -1,5 +1,7 @@
 //! The encoder's view of a source: the rotated basis, energies and peaks, from one pass over all tiles or from a sample.
 
+use std::ops::Range;
+
 use super::basis_rotation::{BasisRotation, coefficient_moments};
 use super::encoder_input::EncoderInput;
 use crate::format::codec::{direct_functions, transform};
@@ -57,12 +59,11 @@ impl SourceStatistics {
             fits(tile.coefficients.len(), rank) && fits(tile.functions.len(), area),
             "a value for each pixel and component or slot"
         );
-        let functions = tile.functions.iter().flatten().filter(|v| v.is_finite());
         Self {
             moments: coefficient_moments(tile, rank),
-            function_energy: functions.map(|v| f64::from(*v).powi(2)).sum(),
-            coefficient_peak: peak(&tile.coefficients),
-            function_peak: peak(&tile.functions),
+            function_energy: energy(tile.functions.as_flattened()),
+            coefficient_peak: peak(tile.coefficients.iter()),
+            function_peak: peak(tile.functions.iter()),
         }
     }
 
@@ -90,8 +91,15 @@ pub fn non_empty<T>(values: &[T]) -> Option<&[T]> {
     (!values.is_empty()).then_some(values)
 }
 
-fn peak(values: &[[f32; CHANNELS]]) -> f32 {
-    let finite = values.iter().flatten().filter(|v| v.is_finite());
+/// Sum of squares of the finite values.
+pub fn energy(values: &[f32]) -> f64 {
+    let finite = values.iter().filter(|v| v.is_finite());
+    finite.map(|v| f64::from(*v).powi(2)).sum()
+}
+
+/// Largest magnitude of the finite values.
+pub fn peak<'a>(values: impl Iterator<Item = &'a [f32; CHANNELS]>) -> f32 {
+    let finite = values.flatten().filter(|v| v.is_finite());
     finite.fold(0.0, |peak, v| peak.max(v.abs()))
 }
 
@@ -221,15 +229,28 @@ pub fn for_tiles<T: Send>(
     source: &EncoderInput<'_>,
     executor: &impl Executor,
     work: impl Fn(FloatTile) -> T + Sync + Send,
-    mut take: impl FnMut(usize, T) -> Result<(), FormatError>,
+    take: impl FnMut(usize, T) -> Result<(), FormatError>,
 ) -> Result<(), FormatError> {
-    let count = source.geometry.tile_grid().area();
-    for first in (0..count).step_by(BATCH_TILES) {
-        let results = executor.map(BATCH_TILES.min(count - first), |i| {
-            (source.tile)(first + i).map(&work)
-        });
+    let tiles = 0..source.geometry.tile_grid().area();
+    let work = |i| (source.tile)(i).map(&work).map_err(FormatError::Source);
+    in_batches(tiles, executor, work, take)
+}
+
+/// Works on each of some `tiles`, and takes the results in order.
+///
+/// # Errors
+/// Those of `work` and `take`.
+pub fn in_batches<T: Send, E: From<FormatError>>(
+    tiles: Range<usize>,
+    executor: &impl Executor,
+    work: impl Fn(usize) -> Result<T, FormatError> + Sync + Send,
+    mut take: impl FnMut(usize, T) -> Result<(), E>,
+) -> Result<(), E> {
+    for first in tiles.clone().step_by(BATCH_TILES) {
+        let count = BATCH_TILES.min(tiles.end - first);
+        let results = executor.map(count, |i| work(first + i));
         for (i, result) in results.into_iter().enumerate() {
-            take(first + i, result.map_err(FormatError::Source)?)?;
+            take(first + i, result?)?;
         }
     }
     Ok(())
