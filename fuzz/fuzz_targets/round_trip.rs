@@ -15,7 +15,7 @@ fuzz_target!(|data: &[u8]| {
         TargetChoice::Loss(_) => choices.bytes(),
         _ => [0; 9],
     };
-    let input = ArbitraryInput::new(&mut choices);
+    let input = ArbitraryInput::new(&mut choices, target.max_slots());
     let encoded = match target.encode(&input, &losses) {
         Ok(encoded) => encoded,
         Err(FormatError::TooLarge { smallest, limit })

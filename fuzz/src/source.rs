@@ -65,6 +65,14 @@ pub fn geometry(choices: &mut Choices<'_>) -> Geometry {
     .expect("all fields are in their ranges")
 }
 
+/// The geometry with as many rows as `slots` allows, at least one.
+fn cropped(mut geometry: Geometry, slots: usize) -> Geometry {
+    let slots_of_row = geometry.camera.width as usize * geometry.window.area();
+    let rows = u32::try_from(slots / slots_of_row).unwrap_or(u32::MAX);
+    geometry.camera.height = geometry.camera.height.min(rows.max(1));
+    geometry
+}
+
 /// The input of the encoder.
 pub struct ArbitraryInput {
     pub geometry: Geometry,
@@ -88,9 +96,10 @@ impl std::fmt::Debug for ArbitraryInput {
 }
 
 impl ArbitraryInput {
-    pub fn new(choices: &mut Choices<'_>) -> Self {
+    /// Light transport of at most so many `slots` of windows.
+    pub fn new(choices: &mut Choices<'_>, slots: usize) -> Self {
         let mut input = Self {
-            geometry: geometry(choices),
+            geometry: cropped(geometry(choices), slots),
             basis: None,
             tiles: Vec::new(),
             metadata: Metadata::default(),
@@ -277,6 +286,14 @@ impl TargetChoice {
             2 => Self::Loss(Decibels(choices.of([0.1, 0.3, 3.0, 0.0, f64::NAN]))),
             3 => Self::Snr(Decibels(choices.f64())),
             _ => Self::Snr(Decibels(f64::from(choices.below(90)))),
+        }
+    }
+
+    /// Slots of windows that are encoded in about two seconds with all checks of the fuzzer: a size takes ten attempts.
+    pub fn max_slots(self) -> usize {
+        match self {
+            Self::Bytes(_) => 3_000,
+            Self::Snr(_) | Self::Lossless | Self::Loss(_) => 12_000,
         }
     }
 
