@@ -18,7 +18,7 @@ use relightable_photo::format::{
     FormatError, FormatExtension, Limits, LtmReader, Metadata, ShardId, Spool,
 };
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::pyramid::{PyramidLayout, PyramidReader, write_pyramid};
+use relightable_photo::pyramid::{PyramidLayout, PyramidReader, PyramidSource, write_pyramid};
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::{
     Basis, CHANNELS, CameraPixel, Correspondence, Decibels, DisplacementGrid, FloatTile, Geometry,
@@ -263,9 +263,13 @@ fn levels() -> Vec<u8> {
     };
     let spools = [(); 2].map(|()| Spool::new(Cursor::new(Vec::new())));
     let mut out = Vec::new();
+    let source = PyramidSource {
+        index: &index,
+        fetch: &fetch,
+    };
     write_pyramid(
-        &index,
-        &fetch,
+        source,
+        &|_| Ok(None),
         layout,
         spools,
         &SequentialExecutor,

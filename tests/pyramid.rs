@@ -13,7 +13,10 @@ use relightable_photo::format::{
     Metadata, ShardId, Spool, decode_tile,
 };
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::pyramid::{PyramidLayout, PyramidReader, write_pyramid};
+use relightable_photo::pyramid::{
+    FetchShard, LevelShares, PyramidLayout, PyramidReader, PyramidSource, make_coarser_shards,
+    write_pyramid,
+};
 use relightable_photo::relight::{Light, reference};
 use relightable_photo::transport::{
     Basis, CHANNELS, CameraPixel, Decibels, DisplacementGrid, Extent, FloatTile, Geometry,
@@ -77,16 +80,57 @@ impl Flat {
 
     /// The same as a file of several levels.
     fn with_levels(&self, levels: u32) -> Vec<u8> {
-        let spools = [(); 2].map(|()| Spool::new(Cursor::new(Vec::new())));
-        let layout = PyramidLayout {
-            shard_side: SHARD,
-            ..PyramidLayout::of_levels(levels)
-        };
+        self.with_shards(levels, &|_| Ok(None))
+    }
+
+    /// The same as a file of several levels, with shards that are made already.
+    fn with_shards(&self, levels: u32, made: &FetchShard<'_>) -> Vec<u8> {
         let (mut file, fetch) = (Vec::new(), |chunk| Ok(self.chunk(chunk)));
+        let source = PyramidSource {
+            index: &self.index,
+            fetch: &fetch,
+        };
         let executor = SequentialExecutor;
-        write_pyramid(&self.index, &fetch, layout, spools, &executor, &mut file).unwrap();
+        write_pyramid(source, made, layout(levels), spools(), &executor, &mut file).unwrap();
         file
     }
+
+    /// The shards of coarser levels that each of several processes makes, by their numbers.
+    fn shards_of(&self, shares: &LevelShares, processes: usize) -> Vec<Vec<u8>> {
+        let geometry = &self.index.header.geometry;
+        let mut files = Vec::new();
+        for process in 0..processes {
+            let rows = shares.rows(process);
+            let fetch = |chunk: ChunkId| {
+                let tile = chunk.tile.map(|tile| geometry.tile(tile));
+                assert!(tile.is_none_or(|tile| rows.contains(&tile.y)));
+                Ok(self.chunk(chunk))
+            };
+            let source = PyramidSource {
+                index: &self.index,
+                fetch: &fetch,
+            };
+            let take = |number, file| {
+                assert_eq!(number, files.len());
+                files.push(file);
+                Ok::<_, FormatError>(())
+            };
+            let executor = SequentialExecutor;
+            make_coarser_shards(source, shares, process, spools(), &executor, take).unwrap();
+        }
+        files
+    }
+}
+
+fn layout(levels: u32) -> PyramidLayout {
+    PyramidLayout {
+        shard_side: SHARD,
+        ..PyramidLayout::of_levels(levels)
+    }
+}
+
+fn spools() -> [Spool<Cursor<Vec<u8>>>; 2] {
+    [(); 2].map(|()| Spool::new(Cursor::new(Vec::new())))
 }
 
 fn bytes_at(file: &[u8], range: Range<u64>) -> Vec<u8> {
@@ -292,6 +336,55 @@ fn quantised_levels_are_as_accurate_as_the_finest() {
         let difference = difference(&expected, &relit(&file, level, &coarse));
         assert!(difference < 0.05, "level {level}: {difference}");
     }
+}
+
+#[test]
+fn several_processes_make_the_shards_of_one() {
+    let affine = [[0.5, 0.03, 2.0], [-0.02, 0.48, 3.5]];
+    let wide = tiled([1100, 40], [540, 30], 5, TILE, affine);
+    let tall = tiled([70, 530], [40, 260], 5, TILE, affine);
+    let snr = EncodingTarget::Snr(Decibels(30.0));
+    for (geometry, levels, target, all_processes) in [
+        (tall, 3, EncodingTarget::Lossless, &[2][..]),
+        (wide.clone(), 4, snr, &[1, 7]),
+    ] {
+        let table = layout(levels).table(&geometry).unwrap();
+        let flat = Flat::new(geometry, 3, target);
+        let expected = flat.with_levels(levels);
+        for &processes in all_processes {
+            let shares = LevelShares::new(table.clone(), processes);
+            let files = flat.shards_of(&shares, processes);
+            assert_eq!(files.len(), shares.shards().len());
+            let made = |shard| Ok(shares.number(shard).map(|number| files[number].clone()));
+            assert!(flat.with_shards(levels, &made) == expected);
+            let odd = |shard| shares.number(shard).filter(|number| number % 2 == 1);
+            let made = |shard| Ok(odd(shard).map(|number| files[number].clone()));
+            assert!(flat.with_shards(levels, &made) == expected);
+        }
+    }
+    // What is made already is not made again.
+    let coarse = Flat::new(wide.clone(), 3, EncodingTarget::Snr(Decibels(20.0)));
+    let flat = Flat::new(wide.clone(), 3, snr);
+    let shares = LevelShares::new(layout(4).table(&wide).unwrap(), 1);
+    let files = coarse.shards_of(&shares, 1);
+    let made = |shard| Ok(shares.number(shard).map(|number| files[number].clone()));
+    let file = flat.with_shards(4, &made);
+    let reader = open(&file).unwrap();
+    for (id, shard) in shares.shards().iter().zip(&files) {
+        assert!(bytes_at(&file, reader.range(*id).unwrap()) == *shard);
+    }
+    // A shard of another place is told.
+    let misplaced = |shard| Ok(shares.number(shard).map(|_| files[0].clone()));
+    let source = PyramidSource {
+        index: &flat.index,
+        fetch: &|chunk| Ok(flat.chunk(chunk)),
+    };
+    let (executor, mut out) = (SequentialExecutor, Vec::new());
+    let file = write_pyramid(source, &misplaced, layout(4), spools(), &executor, &mut out);
+    assert!(
+        matches!(file, Err(FormatError::DamagedSection { .. })),
+        "{file:?}"
+    );
 }
 
 #[test]

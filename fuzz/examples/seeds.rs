@@ -10,7 +10,7 @@ use fuzzing::source::ArbitraryInput;
 use image::{DynamicImage, ImageFormat};
 use relightable_photo::format::{EncodingTarget, FormatError, Metadata, Spool};
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::pyramid::{PyramidLayout, write_pyramid};
+use relightable_photo::pyramid::{PyramidLayout, PyramidSource, write_pyramid};
 use relightable_photo::transport::{
     Basis, Correspondence, Decibels, Extent, FloatTile, Geometry, Window,
 };
@@ -111,9 +111,13 @@ fn levels() -> Result<Vec<u8>, FormatError> {
     };
     let spools = [(); 2].map(|()| Spool::new(Cursor::new(Vec::new())));
     let mut file = Vec::new();
-    write_pyramid(
+    let source = PyramidSource {
         index,
-        &fetch,
+        fetch: &fetch,
+    };
+    write_pyramid(
+        source,
+        &|_| Ok(None),
         layout,
         spools,
         &SequentialExecutor,

@@ -292,8 +292,8 @@ impl TargetChoice {
     /// Slots of windows that are encoded in about two seconds with all checks of the fuzzer: a size takes ten attempts.
     pub fn max_slots(self) -> usize {
         match self {
-            Self::Bytes(_) => 3_000,
-            Self::Snr(_) | Self::Lossless | Self::Loss(_) => 12_000,
+            Self::Bytes(_) => 1_500,
+            Self::Snr(_) | Self::Lossless | Self::Loss(_) => 8_000,
         }
     }
 

@@ -16,7 +16,7 @@ use super::process_resources::{Interrupted, InterruptibleCores, peak_rss_bytes};
 use super::progress;
 use super::report::{format_bytes, print_json, print_line};
 use crate::format::{ChunkId, FormatError, LevelTable};
-use crate::pyramid::PyramidLayout;
+use crate::pyramid::{PyramidLayout, PyramidSource};
 
 /// Write a large relightable photograph as one of several levels, of which viewers fetch the part and the level that are
 /// seen
@@ -82,7 +82,12 @@ pub fn run(args: &EncodeArgs) -> Result<()> {
     let spinner = progress::spinner("coarsening");
     let mut shards = 1;
     let file_bytes = output.finish_from_input(|out| {
-        let written = write_levels(&args.output, &index, &fetch, layout, &cores, out);
+        let source = PyramidSource {
+            index: &index,
+            fetch: &fetch,
+        };
+        let none = |_| Ok(None);
+        let written = write_levels(&args.output, source, &none, layout, &cores, out);
         let table = written.map_err(|error| match error {
             FormatError::Write(_) | FormatError::Spool(_) => error.into(),
             FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => {

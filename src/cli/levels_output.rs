@@ -7,9 +7,12 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 
 use super::output_file::temporary_beside;
-use crate::format::{ChunkId, FileIndex, FormatError, LevelTable, Spool};
+use crate::format::{FormatError, LevelTable, Spool};
 use crate::job_executor::Executor;
-use crate::pyramid::{PyramidLayout, SHARD_SIDE, least_level_count, level_count, write_pyramid};
+use crate::pyramid::{
+    FetchShard, PyramidLayout, PyramidSource, SHARD_SIDE, least_level_count, level_count,
+    write_pyramid,
+};
 use crate::transport::Extent;
 
 /// The number of levels of a picture of `camera` pixels: `asked`, or the usual one.
@@ -26,20 +29,21 @@ pub fn levels_of(asked: Option<u32>, camera: Extent) -> Result<u32> {
     Ok(levels)
 }
 
-/// Writes a file of one level as one of several. Temporary files are kept beside the output.
+/// Writes a file of one level as one of several; `made` gives the shards that are made already. Temporary files are kept
+/// beside the output.
 ///
 /// # Errors
 /// Those of [`write_pyramid`].
 pub fn write_levels(
     output: &Path,
-    index: &FileIndex,
-    fetch: &(dyn Fn(ChunkId) -> Result<Vec<u8>, FormatError> + Sync),
+    source: PyramidSource<'_>,
+    made: &FetchShard<'_>,
     layout: PyramidLayout,
     executor: &impl Executor,
     out: &mut impl Write,
 ) -> Result<LevelTable, FormatError> {
     let spools = [temporary_spool(output)?, temporary_spool(output)?];
-    write_pyramid(index, fetch, layout, spools, executor, out)
+    write_pyramid(source, made, layout, spools, executor, out)
 }
 
 /// An unnamed temporary file in the folder of a path.

@@ -1,14 +1,16 @@
 //! The process: its cores, its memory, and the signals that interrupt it.
 
+use std::io::ErrorKind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Error, Result};
 use rayon::prelude::*;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use crate::job_executor::Executor;
+use crate::format::FormatError;
+use crate::job_executor::{Cancelled, Executor};
 
 /// Runs jobs on all cores of rayon's current pool.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +60,14 @@ pub const INTERRUPTED_STATUS: u8 = 130;
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Interrupted(pub String);
+
+/// [`Cancelled`], where that is why encoding failed; other errors stay.
+pub fn cancelled_or(error: Error) -> Error {
+    match error.downcast_ref() {
+        Some(FormatError::Source(e)) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
+        _ => error,
+    }
+}
 
 /// A pool of so many threads.
 pub fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {

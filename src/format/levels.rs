@@ -37,7 +37,7 @@ const SHARD_SIDES: Range<u32> = 256..4097;
 const MAX_LEVELS: u32 = 14;
 
 /// A shard: a square part of a level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ShardId {
     /// The level; 0 is the finest.
     pub level: u32,
@@ -197,6 +197,12 @@ impl LevelTable {
         &self.shards
     }
 
+    /// The shards of a level, row by row; of the root's level the root.
+    pub fn shards_of(&self, level: u32) -> impl Iterator<Item = ShardId> + use<> {
+        let cells = self.shard_grid(level).cells();
+        cells.map(move |(x, y)| ShardId { level, x, y })
+    }
+
     /// The pixels of a shard of the table, in its level.
     ///
     /// # Panics
@@ -331,13 +337,16 @@ impl ShardPlace {
         }
     }
 
-    /// Checks that a file is the shard of `table` with this name.
+    /// Checks that a file of so many bytes is the shard of `table` with this name.
     ///
     /// # Errors
-    /// [`FormatError::DamagedSection`] if the file does not say its place, or belongs at another.
-    pub fn check(index: &FileIndex, table: &LevelTable, shard: ShardId) -> Result<(), FormatError> {
-        let range = table.number(shard).map(|number| table.range(number));
-        let bytes = range.map_or(0, |range| range.end - range.start);
+    /// [`FormatError::DamagedSection`] if the file does not say its place, belongs at another, or has another length.
+    pub fn check(
+        index: &FileIndex,
+        table: &LevelTable,
+        shard: ShardId,
+        bytes: u64,
+    ) -> Result<(), FormatError> {
         let rect = table.rect(shard);
         let light = table.light(shard.level);
         let geometry = &index.header.geometry;

@@ -1,5 +1,6 @@
 //! Geometries of the levels of a picture, and of their shards.
 
+use crate::job_executor::Executor;
 use crate::transport::{
     CameraPixel, Correspondence, DisplacementGrid, Extent, Geometry, GeometryError, LightElement,
     ShardOrigin, TileRect, Window,
@@ -10,7 +11,7 @@ use crate::transport::{
 ///
 /// # Errors
 /// [`GeometryError::Window`] if no window does.
-pub fn halved(geometry: &Geometry) -> Result<Geometry, GeometryError> {
+pub fn halved(geometry: &Geometry, executor: &impl Executor) -> Result<Geometry, GeometryError> {
     let Correspondence {
         affine,
         displacement,
@@ -31,7 +32,7 @@ pub fn halved(geometry: &Geometry) -> Result<Geometry, GeometryError> {
         },
         tile_side: geometry.tile_side,
     };
-    let radius = coarse_radius(geometry, &point);
+    let radius = coarse_radius(geometry, &point, executor);
     let window = Window::new(u32::try_from(2 * radius + 1).unwrap_or(u32::MAX))?;
     Ok(Geometry { window, ..point })
 }
@@ -60,25 +61,30 @@ fn halved_displacement(
 
 /// The largest distance along an axis from the coarse element behind a coarse pixel to the windows of its pixels, as far as
 /// they see any light.
-fn coarse_radius(fine: &Geometry, coarse: &Geometry) -> i64 {
+fn coarse_radius(fine: &Geometry, coarse: &Geometry, executor: &impl Executor) -> i64 {
     let side = i64::from(fine.window.side());
     let distance = |centre: i32, origin: i32| {
         let [first, last] = [i64::from(origin), i64::from(origin) + side - 1];
         let centre = i64::from(centre);
         (centre - first.div_euclid(2)).max(last.div_euclid(2) - centre)
     };
-    let pixels = fine.camera.cells().map(|(x, y)| CameraPixel { x, y });
-    // Positions far off the light plane saturate.
-    let pixels = pixels.filter(|pixel| !fine.clip_window(fine.window_origin(*pixel)).is_empty());
-    let distances = pixels.map(|pixel| {
-        let centre = coarse.window_origin(CameraPixel {
-            x: pixel.x / 2,
-            y: pixel.y / 2,
+    let largest_of_row = |y: usize| {
+        let pixels = (0..fine.camera.width).map(|x| CameraPixel { x, y: y as u32 });
+        // Positions far off the light plane saturate.
+        let pixels =
+            pixels.filter(|pixel| !fine.clip_window(fine.window_origin(*pixel)).is_empty());
+        let distances = pixels.map(|pixel| {
+            let centre = coarse.window_origin(CameraPixel {
+                x: pixel.x / 2,
+                y: pixel.y / 2,
+            });
+            let origin = fine.window_origin(pixel);
+            distance(centre.u, origin.u).max(distance(centre.v, origin.v))
         });
-        let origin = fine.window_origin(pixel);
-        distance(centre.u, origin.u).max(distance(centre.v, origin.v))
-    });
-    distances.max().unwrap_or(0)
+        distances.max().unwrap_or(0)
+    };
+    let rows = executor.map(fine.camera.height as usize, largest_of_row);
+    rows.into_iter().max().unwrap_or(0)
 }
 
 /// The shard of `geometry` with the pixels `rect`: the light elements that they see, and the correspondence between both.

@@ -153,6 +153,7 @@ impl PyramidReader {
             let reason = format!("there is no {shard}");
             FormatError::Source(io::Error::new(ErrorKind::NotFound, reason))
         })?;
+        let bytes = range.end - range.start;
         let mut opened = OpenedShard {
             reader: LtmReader::new(self.limits),
             range,
@@ -162,10 +163,27 @@ impl PyramidReader {
         if shard.level < self.table.levels() - 1
             && let Some(index) = opened.reader.index()
         {
-            ShardPlace::check(index, &self.table, shard)?;
+            ShardPlace::check(index, &self.table, shard, bytes)?;
         }
         Ok(opened)
     }
+}
+
+/// The index of a trusted shard that is whole in memory.
+///
+/// # Errors
+/// A [`FormatError`] if it is damaged.
+pub(super) fn read_index(file: &[u8]) -> Result<FileIndex, FormatError> {
+    let mut opened = OpenedShard {
+        reader: LtmReader::new(Limits {
+            decoded_bytes: u64::MAX,
+        }),
+        range: 0..file.len() as u64,
+        fetch: |range: Range<u64>| Ok(file[range.start as usize..range.end as usize].to_vec()),
+    };
+    opened.feed_index::<FormatError>()?;
+    let OpenedShard { reader, .. } = opened;
+    reader.index().cloned().ok_or_else(|| reader.truncated())
 }
 
 /// A shard whose index has been read.

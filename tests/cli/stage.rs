@@ -8,6 +8,8 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::enlargement::{Enlargement, enlarge_capture};
+
 pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
@@ -106,6 +108,10 @@ impl Job {
         ["stage", "tiles", text(&self.stages), "--shard", shard]
     }
 
+    fn levels_args<'a>(&'a self, shard: &'a str) -> [&'a str; 5] {
+        ["stage", "levels", text(&self.stages), "--shard", shard]
+    }
+
     pub fn tiles(&self, shard: &str) -> Output {
         succeeds(&self.tiles_args(shard))
     }
@@ -167,6 +173,72 @@ fn shards_write_the_bytes_of_one_recovery() {
         assert!(String::from_utf8_lossy(&again.stdout).contains("is complete"));
     }
     assert_eq!(files.each_ref().map(|path| written(path)), before);
+}
+
+/// Of three levels, the middle one has two shards.
+#[test]
+fn shards_of_coarser_levels_are_made_by_several_processes() {
+    let mut job = Job::new("16x600", &[], &LEARNED);
+    let large = job.path("large");
+    enlarge_capture(&job.capture, &large, Enlargement::by(2));
+    job.capture = large;
+    let recovered = job.recover(&[]);
+    job.plan(&[]);
+    job.learn();
+    let stages = text(&job.stages);
+    let printed = |output: Output| String::from_utf8(output.stdout).unwrap();
+    job.tiles("2/2");
+    let of_two = |count| format!(": {count} of 2 shards of coarser levels");
+    assert!(printed(succeeds(&job.levels_args("2/2"))).contains(&of_two(1)));
+    let words = ["1-of-2.pack", "is missing", "stage tiles"];
+    fails(&job.levels_args("1/2"), 75, &words);
+    // The first of three processes has none.
+    let [none, one, two] = [0, 1, 2].map(of_two);
+    let complete = ": is complete".to_owned();
+    for expected in [vec![&one, &complete], vec![&two], vec![&none, &one, &one]] {
+        let count = expected.len();
+        let shards: Vec<_> = (1..=count)
+            .map(|number| format!("{number}/{count}"))
+            .collect();
+        for shard in &shards {
+            job.tiles(shard);
+        }
+        for (shard, expected) in shards.iter().zip(expected) {
+            let text = printed(succeeds(&job.levels_args(shard)));
+            assert!(text.contains(expected), "{shard}: {text}");
+        }
+        assert!(job.assemble(count) == recovered, "{count} shards");
+    }
+    // Without its pack, or from a damaged one, a shard is made by `assemble`.
+    let packs = ["1-of-3.levels", "2-of-3.levels", "3-of-3.levels"].map(|name| job.pack(name));
+    fs::remove_file(&packs[2]).unwrap();
+    assert!(job.assemble(3) == recovered);
+    let mut bytes = fs::read(&packs[1]).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&packs[1], bytes).unwrap();
+    let file = job.path("assembled.ltm");
+    let args = [
+        "stage",
+        "assemble",
+        stages,
+        "--shards",
+        "3",
+        "-o",
+        text(&file),
+    ];
+    let note = stderr_text(&succeeds(&args));
+    assert!(
+        note.contains("note: ") && note.contains("2-of-3.levels"),
+        "{note}"
+    );
+    assert!(fs::read(&file).unwrap() == recovered.0);
+    // There is nothing to share of one level.
+    job.plan(&["--levels", "1"]);
+    job.learn();
+    assert!(
+        printed(succeeds(&job.levels_args("1/1"))).contains(": 0 of 0 shards of coarser levels")
+    );
 }
 
 /// Registration, estimated responses and defective pixels reach every shard.

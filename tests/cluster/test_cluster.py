@@ -185,6 +185,7 @@ STAGES = [
     "assemble",
     *(f"ingest {i} of 3" for i in range(1, 4)),
     "learn",
+    *(f"make coarser levels {i} of 3" for i in range(1, 4)),
     "plan",
     *(f"recover tiles {i} of 3" for i in range(1, 4)),
 ]
@@ -246,6 +247,7 @@ case $key in
   plan) mkdir -p "$output/shards" && echo plan >"$output/plan.json" ;;
   learn) echo learned >"$3/learned.bin" ;;
   tiles) echo tiles >"$3/shards/${5%/*}-of-${5#*/}.pack" ;;
+  levels) echo levels >"$3/shards/${5%/*}-of-${5#*/}.levels" ;;
   *) echo "$key" >"$output" && echo '{"levels": 2, "warnings": []}' ;;
 esac
 """
@@ -356,7 +358,7 @@ class ArrayTest(unittest.TestCase):
         subprocess.run(command, env=environment, check=True, capture_output=True, timeout=60)
         stages = f"{folder.resolve()}/{name}-stages"
         calls = f"3|stage|plan|{folder.resolve()}/{name}|--window|7|-o|{stages}|3|stage|learn|{stages}|"
-        calls += f"3|stage|tiles|{stages}|--shard|2/4|"
+        calls += f"3|stage|tiles|{stages}|--shard|2/4|3|stage|levels|{stages}|--shard|2/4|"
         calls += f"3|stage|assemble|{stages}|--shards|4|-o|{folder.resolve()}/{name}.ltm|"
         self.assertEqual((folder / "calls").read_text(encoding="utf-8"), calls)
 
@@ -547,6 +549,7 @@ class FullDiskTest(WorkflowTest):
             ["plan", copy, "-o", stages, *OPTIONS.split()],
             ["learn", stages],
             ["tiles", stages, "--shard", "1/1"],
+            ["levels", stages, "--shard", "1/1"],
             ["assemble", stages, "--shards", "1", "-o", file],
         ):
             # Less than a page is free, and folders take none.
@@ -609,7 +612,7 @@ class SlurmTest(WorkflowTest):
         wait_until(lambda: not running.pids(), SECONDS)
         self.assertEqual(running.file.read_bytes(), running.expected)
         shards = sorted(path.name for path in (running.stages / "shards").iterdir())
-        self.assertEqual(shards, ["1-of-2.pack", "2-of-2.pack"])
+        self.assertEqual(shards, ["1-of-2.levels", "1-of-2.pack", "2-of-2.levels", "2-of-2.pack"])
 
     def submit_array(self, capture, file, shards):
         """Submits a capture. Returns the numbers of the jobs."""
@@ -628,7 +631,7 @@ class SlurmTest(WorkflowTest):
         folder = self.folder / f"{self.id().split('.')[-1]}-files"
         folder.mkdir()
         running = RunningShard(folder)
-        *_, tiles, running.assemble = self.submit_array(running.capture, running.file, 2)
+        *_, tiles, _, running.assemble = self.submit_array(running.capture, running.file, 2)
         partial = running.stages / "shards"
         wait_until(lambda: any(path.stat().st_size > 20_000 for path in partial.glob("1-of-2.*.partial")), SECONDS)
         # Each shard is a job of its own, with a node.

@@ -11,8 +11,8 @@ STAGE_FILES = {"ingest": "ingested/capture.json", "plan": "plan.json", "learn": 
 def remove_lost_results(name):
     """Removes the result of a capture whose file is gone.
 
-    Without this result, also those of its stages that failed or whose file is gone; if there are any, those of ingesting as
-    well, as a photograph of the copy may be damaged or gone.
+    Without this result, also those of its stages that failed or whose file is gone; if there are any, those of
+    ingesting as well, as a photograph of the copy may be damaged or gone.
     """
     result = Path(name + SUFFIX)
     file = (read_json(result) or {}).get("file")
@@ -28,5 +28,10 @@ def remove_lost_results(name):
 def is_lost(path):
     """Whether a stage failed, or its file is gone."""
     stage = path.name.removesuffix(SUFFIX)
-    file = path.parent / STAGE_FILES.get(stage.split("-")[0], f"shards/{stage}.pack")
+    first, _, shard = stage.partition("-")
+    if first == "levels":
+        file = f"shards/{shard}.levels"
+    else:
+        file = STAGE_FILES.get(first, f"shards/{stage}.pack")
+    file = path.parent / file
     return (read_json(path) or {}).get("status") != "done" or not file.exists()

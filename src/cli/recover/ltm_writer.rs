@@ -17,9 +17,9 @@ use crate::cli::output_file::{LTM, OutputFile};
 use crate::cli::process_resources::{InterruptibleCores, thread_pool};
 use crate::cli::progress;
 use crate::export::{self, EncodingMemory, FileQuality};
-use crate::format::{ChunkStore, EncodedFile, FormatError, Metadata, SpooledChunks};
+use crate::format::{ChunkStore, EncodedFile, FormatError, Metadata, ShardId, SpooledChunks};
 use crate::job_executor::Cancelled;
-use crate::pyramid::PyramidLayout;
+use crate::pyramid::{PyramidLayout, PyramidSource};
 use crate::transport::Decibels;
 
 /// Share of the bytes that the finest of several levels usually takes.
@@ -60,6 +60,14 @@ pub trait FileTiles: Sync {
         input: &WriterInput<'_>,
         quality: FileQuality,
     ) -> Result<EncodedFile<Self::Store>, FormatError>;
+
+    /// The file of a shard of a coarser level, if it is made already.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    fn level_shard(&self, _: ShardId) -> Result<Option<Vec<u8>>, FormatError> {
+        Ok(None)
+    }
 }
 
 /// Recovered tiles, whose records this function reads.
@@ -174,11 +182,14 @@ impl<T: FileTiles> LtmWriter<'_, T> {
                         max_bytes,
                         ..PyramidLayout::of_levels(levels)
                     };
-                    let fetch = |chunk| Ok(file.chunk(chunk)?.into_owned());
+                    let source = PyramidSource {
+                        index: file.index(),
+                        fetch: &|chunk| Ok(file.chunk(chunk)?.into_owned()),
+                    };
                     write_levels(
                         destination.output,
-                        file.index(),
-                        &fetch,
+                        source,
+                        &|shard| self.tiles.level_shard(shard),
                         layout,
                         destination.cores,
                         out,

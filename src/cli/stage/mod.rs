@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! (PNGs ── ingest ── TIFFs)
-//! capture ── plan ── plan.json ── learn ── learned.bin ─┬─ tiles 1/n ── shards/1-of-n.pack ─┬─ assemble ── .ltm
-//!                                                       ├─ tiles 2/n ── shards/2-of-n.pack ─┤
-//!                                                       ⋮                                   ⋮
+//! capture ── plan ── learn ─┬─ tiles 1/n ─┬─ levels 1/n ─┬─ assemble ── .ltm
+//!                           ├─ tiles 2/n ─┼─ levels 2/n ─┤
+//!                           ⋮             ⋮              ⋮
 //! ```
 //!
 //! `recover` is the same stages in one process. Every stage may be repeated: a file that is complete and follows from its
@@ -12,8 +12,11 @@
 //! another plan are told.
 
 mod encoded_record;
+mod encoded_tiles;
 mod ingest;
 mod learned_file;
+mod level_packs;
+mod pack;
 mod pack_file;
 mod partial_shards;
 mod plan;
@@ -31,26 +34,32 @@ use clap::{Args, Subcommand};
 pub use self::ingest::IngestNameError;
 pub use self::stage_folder::StageFileError;
 
+use self::encoded_tiles::EncodedTiles;
 use self::ingest::Ingestion;
 use self::learned_file::LearnedFile;
+use self::level_packs::{LevelPacks, level_key, level_shares};
+use self::pack::Pack;
 use self::partial_shards::PartialShard;
 use self::plan::{Comparison, RecoveryPlan};
 use self::shard::Shard;
-use self::shard_packs::{EncodedTiles, ShardPack, ShardPacks};
+use self::shard_packs::ShardPacks;
 use self::shard_tiles::ShardTiles;
 use self::stage_folder::StageFolder;
+use super::levels_output::temporary_spool;
 use super::output_file::{LTM, OutputFile};
-use super::process_resources::{Interrupted, InterruptibleCores, thread_pool};
+use super::process_resources::{Interrupted, InterruptibleCores, cancelled_or, thread_pool};
 use super::recover::args::{DEFAULT_MEMORY, RecoveryOptions};
 use super::recover::capture_sample::SampleSource;
 use super::recover::inputs::{RecoveryInputs, encoders, encoding_memory};
 use super::recover::ltm_writer::{Destination, RecoveredTiles, finish};
 use super::recover::prepared_job::PreparedJob;
-use super::recover::tile_recovery::{TilePhotographs, TileRecovery};
+use super::recover::tile_recovery::{TileCounts, TilePhotographs, TileRecovery};
 use super::report::{print_json, print_line};
 use super::value_parsers::ByteCount;
 use crate::capture::{CaptureFolder, MANIFEST_NAME};
+use crate::export;
 use crate::job_executor::Cancelled;
+use crate::pyramid::{PyramidSource, make_coarser_shards};
 
 /// What to do after a `--max-bytes` that is too low.
 const TOO_LARGE_REMEDY: &str =
@@ -69,6 +78,7 @@ enum Stage {
     Plan(PlanArgs),
     Learn(LearnArgs),
     Tiles(TilesArgs),
+    Levels(LevelsArgs),
     Assemble(AssembleArgs),
 }
 
@@ -120,7 +130,21 @@ struct TilesArgs {
     memory: ByteCount,
 }
 
-/// Encode the tiles of all shards and write the file
+/// Make one of several shares of a large picture's coarser levels, and write shards/I-of-N.levels. Without it `assemble` makes
+/// them
+#[derive(Debug, Args)]
+struct LevelsArgs {
+    #[command(flatten)]
+    folders: Folders,
+    /// Which of how many shares: as many as shards of tiles
+    #[arg(long, value_name = "I/N", value_parser = Shard::parse)]
+    shard: Shard,
+    /// Limit on memory
+    #[arg(long, value_name = "BYTES", default_value = DEFAULT_MEMORY, value_parser = ByteCount::parse)]
+    memory: ByteCount,
+}
+
+/// Put the tiles of all shards together and write the file
 #[derive(Debug, Args)]
 struct AssembleArgs {
     #[command(flatten)]
@@ -158,6 +182,7 @@ pub fn run(args: &StageArgs) -> Result<()> {
         Stage::Plan(args) => plan(args, &cores),
         Stage::Learn(args) => learn(args, &cores),
         Stage::Tiles(args) => tiles(args, &cores),
+        Stage::Levels(args) => levels(args, &cores),
         Stage::Assemble(args) => assemble(args, &cores),
     };
     result.map_err(|error| match error.is::<Cancelled>() {
@@ -269,7 +294,7 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
     let geometry = job.recovery.geometry();
     let key = args.shard.pack_key(&id, &job);
     let path = stages.pack(args.shard);
-    let verify = || ShardPack::open(&path, &key, "");
+    let verify = || Pack::open(&path, &key, "");
     let print_complete = || print_line(&format!("{}: is complete", path.display()));
     let recovered = args.shard.recovered_key(&id, geometry);
     let sink = PartialShard::open(&stages, args.shard, &recovered)?;
@@ -323,8 +348,65 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
     print_line(&format!(
         "{}: {} tiles of shard {}",
         path.display(),
-        key.tiles.len(),
+        key.items.len(),
         args.shard
+    ))
+}
+
+fn levels(args: &LevelsArgs, cores: &InterruptibleCores) -> Result<()> {
+    let PlannedCapture {
+        stages,
+        plan,
+        capture,
+    } = args.folders.open(Comparison::Records, cores)?;
+    StageFolder::create(&args.folders.folder)?;
+    let inputs = RecoveryInputs::new(&capture, &plan.options)?;
+    let LearnedFile { id, job } = LearnedFile::read(&stages, &plan, &inputs)?;
+    let shares = level_shares(&job, inputs.levels, args.shard.count())?;
+    let key = level_key(args.shard, &id, shares.as_ref());
+    let path = stages.levels(args.shard);
+    if is_complete(Pack::open(&path, &key, ""))? {
+        return print_line(&format!("{}: is complete", path.display()));
+    }
+    let (geometry, rank) = (job.recovery.geometry(), job.rank().unwrap_or(0));
+    let total = shares.as_ref().map_or(0, |shares| shares.shards().len());
+    let shares = shares.filter(|_| !key.items.is_empty());
+    let encoders = match &shares {
+        Some(_) => encoders(encoding_memory(args.memory), geometry, inputs.levels, rank)?,
+        None => 1,
+    };
+    let make = |add: &mut dyn FnMut(u32, &[u8]) -> Result<()>| -> Result<()> {
+        let (Some(coding), Some(shares)) = (&job.coding, &shares) else {
+            return Ok(());
+        };
+        let process = args.shard.index();
+        let rows = shares.rows(process);
+        let shards = Shard::all(args.shard.count()).filter(|shard| shard.has_rows(&rows, geometry));
+        let packs = ShardPacks::open(&stages, &id, &job, shards, cores)?;
+        let tiles = EncodedTiles {
+            packs: &packs,
+            plan: coding,
+            levels: None,
+            cores,
+        };
+        let metadata = job.metadata(&inputs.shots, inputs.options.method())?;
+        let file = tiles.partial_file(export::file_geometry(&job.recovery), &metadata)?;
+        let source = PyramidSource {
+            index: file.index(),
+            fetch: &|chunk| Ok(file.chunk(chunk)?.into_owned()),
+        };
+        let spools = [temporary_spool(&path)?, temporary_spool(&path)?];
+        let add = |number: usize, file: Vec<u8>| add(number as u32, &file);
+        make_coarser_shards(source, shares, process, spools, cores, add).map_err(cancelled_or)?;
+        // Another process may have replaced learned.bin meanwhile.
+        Ok(stages.check_learned(&id, &LearnedFile::read_id(&stages)?)?)
+    };
+    let write = || pack_file::write(&path, &key, TileCounts::default(), make);
+    thread_pool(encoders)?.install(write)?;
+    print_line(&format!(
+        "{}: {} of {total} shards of coarser levels",
+        path.display(),
+        key.items.len()
     ))
 }
 
@@ -339,7 +421,10 @@ fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
     let inputs = RecoveryInputs::new(&capture, &plan.options)?;
     let LearnedFile { id, mut job } = LearnedFile::read(&stages, &plan, &inputs)?;
     job.findings.print_further();
-    let packs = ShardPacks::open(&stages, &id, &job, args.shards, cores)?;
+    let packs = ShardPacks::open(&stages, &id, &job, Shard::all(args.shards), cores)?;
+    let levels = level_shares(&job, inputs.levels, args.shards)?
+        .map(|shares| LevelPacks::open(&stages, &id, shares, args.shards, cores))
+        .transpose()?;
     let destination = Destination {
         output: &args.output,
         memory: encoding_memory(args.memory),
@@ -352,6 +437,7 @@ fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
             let tiles = EncodedTiles {
                 packs: &packs,
                 plan: &plan,
+                levels: levels.as_ref(),
                 cores,
             };
             finish(start, &inputs, job, counts, &destination, &tiles)?

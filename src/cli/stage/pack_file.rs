@@ -1,12 +1,13 @@
-//! Packs: the tiles of a shard, as they are recovered, or as they are in the file.
+//! Packs: what one of several processes makes of a file. The tiles of a shard, as they are recovered, or as they are in the
+//! file; and shards of coarser levels.
 //!
-//! The 8 bytes `LTMPACK2`, then [records](crate::cli::records):
+//! The 8 bytes `LTMPACK3`, then [records](crate::cli::records):
 //!
 //! | number | content |
 //! |---|---|
 //! | `u32::MAX` | the [`PackKey`] as JSON; the first record |
-//! | index of a tile | the [recovered tile](crate::export::encode_tile), compressed by zstd, or the [encoded tile](super::encoded_record) |
-//! | `u32::MAX - 1` | the [`TileCounts`] as JSON; the last record, after those of all tiles in ascending order |
+//! | number of an item | the [recovered tile](crate::export::encode_tile), compressed by zstd; the [encoded tile](super::encoded_record); or the file of the shard |
+//! | `u32::MAX - 1` | the [`TileCounts`] as JSON; the last record, after those of all items in ascending order |
 //!
 //! A [partial](super::partial_shards) pack has recovered tiles in any order, and lacks the last record.
 
@@ -24,37 +25,40 @@ use crate::cli::records::{Record, RecordReader, encode_record};
 use crate::cli::recover::tile_recovery::TileCounts;
 use crate::format::EncodedTileHead;
 
-const MAGIC: [u8; 8] = *b"LTMPACK2";
-const PACK: FileSignature = FileSignature::of_own_name("a pack of tiles");
+const MAGIC: [u8; 8] = *b"LTMPACK3";
+const PACK: FileSignature = FileSignature::of_own_name("a pack of a stage");
 const KEY: u32 = u32::MAX;
 const COUNTS: u32 = u32::MAX - 1;
 const BUFFER_BYTES: usize = 1 << 18;
 
-/// What the tiles of a pack depend on.
+/// What the items of a pack depend on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PackKey {
     /// Name and version of the program.
     pub program: String,
     /// [`LearnedFile::id`](super::learned_file::LearnedFile::id).
     pub learned: String,
-    pub kind: TileKind,
-    /// Indices of its tiles, row by row, in the picture's tiles of this kind. None if there are more shards than rows of the
-    /// file's tiles.
-    pub tiles: Range<u32>,
+    pub kind: PackKind,
+    /// Numbers of its items among those of this kind: of tiles, row by row; of shards of coarser levels, in their
+    /// [`LevelShares`](crate::pyramid::LevelShares). None if there are more processes
+    /// than items, or nothing to share.
+    pub items: Range<u32>,
 }
 
-/// What a tile is.
+/// What an item is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum TileKind {
-    /// Of the recovery's tiling.
-    Recovered,
-    /// Of the file's tiling, as it is in the file.
-    Encoded,
+pub enum PackKind {
+    /// A tile of the recovery's tiling.
+    RecoveredTiles,
+    /// A tile of the file's tiling, as it is in the file.
+    EncodedTiles,
+    /// A shard of a coarser level, in subtrees whose roots are of this level.
+    LevelShards { root_level: u32 },
 }
 
-/// Where a tile's bytes are in a file.
-pub type TilePlace = Range<u64>;
+/// Where an item's bytes are in a file.
+pub type ItemPlace = Range<u64>;
 
 /// A fault of a pack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,9 +70,9 @@ pub enum PackFault {
 
 /// The intact records of a pack, complete or not.
 pub struct PackContent {
-    /// `[tile of the shard]`: the recovered tiles, or the chunks of the encoded ones.
-    pub places: Vec<Option<TilePlace>>,
-    /// `[tile of the shard]`, of encoded tiles.
+    /// `[item of the pack]`; of encoded tiles the chunks.
+    pub places: Vec<Option<ItemPlace>>,
+    /// `[item of the pack]`, of encoded tiles.
     pub heads: Vec<EncodedTileHead>,
     /// If the pack is complete.
     pub counts: Option<TileCounts>,
@@ -99,7 +103,7 @@ impl PackContent {
             Some(_) => {}
         }
         let mut content = Self {
-            places: vec![None; key.tiles.len()],
+            places: vec![None; key.items.len()],
             heads: Vec::new(),
             counts: None,
         };
@@ -119,15 +123,15 @@ impl PackContent {
         Ok(Ok(content))
     }
 
-    /// Takes the record of a tile; `None` if it is not one of this pack.
+    /// Takes the record of an item; `None` if it is not one of this pack.
     fn add(&mut self, record: Record, key: &PackKey) -> Option<()> {
-        let tile = record.number.checked_sub(key.tiles.start)? as usize;
-        let place = self.places.get_mut(tile)?;
+        let item = record.number.checked_sub(key.items.start)? as usize;
+        let place = self.places.get_mut(item)?;
         match key.kind {
-            TileKind::Recovered => *place = Some(record.range),
-            TileKind::Encoded => {
+            PackKind::RecoveredTiles | PackKind::LevelShards { .. } => *place = Some(record.range),
+            PackKind::EncodedTiles => {
                 // In order, so that heads and places agree.
-                if self.heads.len() != tile {
+                if self.heads.len() != item {
                     return None;
                 }
                 let (head, start) = encoded_record::decode_head(&record.content)?;
@@ -145,20 +149,19 @@ pub fn beginning(key: &PackKey) -> Result<Vec<u8>> {
     Ok([&MAGIC[..], &key].concat())
 }
 
-/// Writes the pack of a shard. `tiles` gives the number and the content of each tile, in order, to the function that it is
-/// called with.
+/// Writes a pack. `items` gives the number and the content of each item, in order, to the function that it is called with.
 ///
 /// # Errors
-/// If it cannot be written, and those of `tiles`.
+/// If it cannot be written, and those of `items`.
 pub fn write(
     path: &Path,
     key: &PackKey,
     counts: TileCounts,
-    tiles: impl FnOnce(&mut dyn FnMut(u32, &[u8]) -> Result<()>) -> Result<()>,
+    items: impl FnOnce(&mut dyn FnMut(u32, &[u8]) -> Result<()>) -> Result<()>,
 ) -> Result<()> {
     OutputFile::create(path, &PACK)?.finish(|out| {
         out.write_all(&beginning(key)?)?;
-        tiles(&mut |tile, content| Ok(out.write_all(&encode_record(tile, content)?)?))?;
+        items(&mut |item, content| Ok(out.write_all(&encode_record(item, content)?)?))?;
         Ok(out.write_all(&encode_record(COUNTS, &serde_json::to_vec(&counts)?)?)?)
     })?;
     Ok(())

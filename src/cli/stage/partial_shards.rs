@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context, Error, Result};
 
-use super::pack_file::{PackContent, PackKey, TilePlace, beginning};
+use super::pack_file::{ItemPlace, PackContent, PackKey, beginning};
 use super::shard::Shard;
 use super::stage_folder::StageFolder;
 use crate::cli::output_file::{temporary_beside, without_path};
@@ -38,7 +38,7 @@ struct PartialTiles {
     /// That of this process, once it has a tile.
     own: Option<OwnPack>,
     /// `[tile of the shard]`.
-    places: Vec<Option<(PackOf, TilePlace)>>,
+    places: Vec<Option<(PackOf, ItemPlace)>>,
 }
 
 #[derive(Clone, Copy)]
@@ -63,7 +63,7 @@ impl PartialShard {
         let learned: String = key.learned.chars().take(ID_DIGITS).collect();
         let (stem, shards) = (format!("{}.{learned}.", shard.file_stem()), stages.shards());
         let mut others = Vec::new();
-        let mut places = vec![None; key.tiles.len()];
+        let mut places = vec![None; key.items.len()];
         for path in partial_packs(&shards, &stem)? {
             let file = match File::open(&path) {
                 // Another process may have finished the shard, and removed it.
@@ -96,7 +96,7 @@ impl PartialShard {
     /// Tells how many tiles are there already.
     pub fn print_count(&self) {
         if self.count() > 0 {
-            let (count, all) = (self.count(), self.key.tiles.len());
+            let (count, all) = (self.count(), self.key.items.len());
             eprintln!("resuming with {count} of {all} tiles");
         }
     }
@@ -156,7 +156,7 @@ impl PartialShard {
 
     /// Index of a tile in the shard.
     fn index(&self, tile: u32) -> usize {
-        (tile - self.key.tiles.start) as usize
+        (tile - self.key.items.start) as usize
     }
 }
 

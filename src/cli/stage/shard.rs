@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use super::pack_file::{PackKey, TileKind};
+use super::pack_file::{PackKey, PackKind};
 use crate::cli::recover::checkpoint_key::PROGRAM;
 use crate::cli::recover::prepared_job::PreparedJob;
 use crate::export::{self, FILE_TILE_SIDE};
@@ -48,6 +48,16 @@ impl Shard {
         items.skip(number - 1).step_by(count)
     }
 
+    /// From 0.
+    pub fn index(self) -> usize {
+        self.number as usize - 1
+    }
+
+    /// How many there are.
+    pub fn count(self) -> u32 {
+        self.count
+    }
+
     /// `3-of-16`.
     pub fn file_stem(self) -> String {
         format!("{}-of-{}", self.number, self.count)
@@ -59,6 +69,14 @@ impl Shard {
             .file_tile_rows(geometry)
             .map(|row| (row * tiles_per_row(geometry)).min(geometry.tile_grid().height));
         start..end
+    }
+
+    /// Whether it has any of these rows of pixels.
+    pub fn has_rows(self, rows: &Range<u32>, geometry: &Geometry) -> bool {
+        let [start, end] = self
+            .file_tile_rows(geometry)
+            .map(|row| row * FILE_TILE_SIDE);
+        start.max(rows.start) < end.min(rows.end)
     }
 
     /// The first of its rows of the file's tiles, and the first of the next shard.
@@ -75,8 +93,8 @@ impl Shard {
         PackKey {
             program: PROGRAM.to_owned(),
             learned: learned.to_owned(),
-            kind: TileKind::Recovered,
-            tiles: rows.start * columns..rows.end * columns,
+            kind: PackKind::RecoveredTiles,
+            items: rows.start * columns..rows.end * columns,
         }
     }
 
@@ -89,8 +107,8 @@ impl Shard {
         let columns = export::file_geometry(&job.recovery).tile_grid().width;
         let [start, end] = self.file_tile_rows(job.recovery.geometry());
         PackKey {
-            kind: TileKind::Encoded,
-            tiles: start * columns..end * columns,
+            kind: PackKind::EncodedTiles,
+            items: start * columns..end * columns,
             ..key
         }
     }
@@ -126,11 +144,11 @@ mod tests {
             let mut next = 0;
             for shard in Shard::all(count) {
                 let key = shard.recovered_key("", &geometry);
-                assert_eq!(key.tiles.start, next);
+                assert_eq!(key.items.start, next);
                 let rows = shard.tile_rows(&geometry);
                 assert_eq!(rows.start % 4, 0);
-                assert_eq!(rows.len() as u32 * grid.width, key.tiles.len() as u32);
-                next = key.tiles.end;
+                assert_eq!(rows.len() as u32 * grid.width, key.items.len() as u32);
+                next = key.items.end;
             }
             assert_eq!(next, grid.area() as u32);
         }

@@ -1,19 +1,17 @@
 //! The tiles of a shard that is recovered, for its pack.
 
-use std::io::{self, ErrorKind};
+use std::io;
 
-use anyhow::{Context, Error, Result};
+use anyhow::{Context, Result};
 
 use super::encoded_record;
 use super::pack_file::PackKey;
 use super::partial_shards::PartialShard;
 use crate::cli::output_file::InputError;
-use crate::cli::process_resources::InterruptibleCores;
+use crate::cli::process_resources::{InterruptibleCores, cancelled_or};
 use crate::cli::recover::prepared_job::PreparedJob;
 use crate::cli::recover::tile_recovery::decompress_tile;
 use crate::export;
-use crate::format::FormatError;
-use crate::job_executor::Cancelled;
 
 pub struct ShardTiles<'a> {
     pub job: &'a PreparedJob,
@@ -25,14 +23,14 @@ impl ShardTiles<'_> {
     /// Gives all tiles of a pack to `add`: encoded, if the job has a plan.
     ///
     /// # Errors
-    /// If a tile cannot be read, those of `add`, and [`Cancelled`].
+    /// If a tile cannot be read, those of `add`, and [`Cancelled`](crate::job_executor::Cancelled).
     pub fn write(
         &self,
         key: &PackKey,
         add: &mut dyn FnMut(u32, &[u8]) -> Result<()>,
     ) -> Result<()> {
         let Some(plan) = &self.job.coding else {
-            let mut tiles = key.tiles.clone();
+            let mut tiles = key.items.clone();
             return tiles.try_for_each(|tile| add(tile, &self.recovered.read(tile)?));
         };
         let record = |i: usize| {
@@ -42,15 +40,12 @@ impl ShardTiles<'_> {
             });
             record.map_err(|error| io::Error::other(InputError(error)))
         };
-        let tiles = key.tiles.start as usize..key.tiles.end as usize;
+        let tiles = key.items.start as usize..key.items.end as usize;
         let recovery = &self.job.recovery;
         let encoded =
             export::for_encoded_tiles(recovery, plan, &record, tiles, self.cores, |i, tile| {
                 add(i as u32, &encoded_record::encode(&tile)?)
             });
-        encoded.map_err(|error: Error| match error.downcast_ref() {
-            Some(FormatError::Source(e)) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
-            _ => error,
-        })
+        encoded.map_err(cancelled_or)
     }
 }

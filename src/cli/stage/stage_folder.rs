@@ -27,9 +27,7 @@ pub enum StageFileProblem {
         made_from: &'static str,
         remedy: String,
     },
-    #[error(
-        "was replaced while a shard was recovered from it; the same command recovers the shard again"
-    )]
+    #[error("was replaced while a shard was made from it; the same command makes the shard again")]
     Replaced,
     #[error("was changed while it was read; the same command reads it again")]
     ChangedWhileRead,
@@ -96,7 +94,7 @@ impl StageFolder {
         format!("\"ltm-export stage {stage} {}{options}\"", self.0.display())
     }
 
-    /// Whether what is learned now, by its id, is what a shard was recovered with.
+    /// Whether what is learned now, by its id, is what a shard was made with.
     ///
     /// # Errors
     /// [`StageFileError`] if it is not.
@@ -122,5 +120,9 @@ impl StageFolder {
 
     pub fn pack(&self, shard: Shard) -> PathBuf {
         self.shards().join(format!("{}.pack", shard.file_stem()))
+    }
+
+    pub fn levels(&self, shard: Shard) -> PathBuf {
+        self.shards().join(format!("{}.levels", shard.file_stem()))
     }
 }

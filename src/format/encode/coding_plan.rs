@@ -284,6 +284,15 @@ impl<'a> TileEncoder<'a> {
 }
 
 impl EncodedTileHead {
+    /// That of a tile whose values are all zero.
+    pub fn dark(plan: &CodingPlan) -> Self {
+        Self {
+            entries: vec![ChunkEntry::default(); plan.scans()],
+            signal: 0.0,
+            errors: vec![0.0; plan.scans()],
+        }
+    }
+
     /// Whether it has an entry and an error for each scan of a plan.
     pub fn is_of(&self, plan: &CodingPlan) -> bool {
         self.entries.len() == plan.scans() && self.errors.len() == plan.scans()
