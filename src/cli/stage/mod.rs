@@ -58,7 +58,7 @@ use super::report::{print_json, print_line};
 use super::value_parsers::ByteCount;
 use crate::capture::{CaptureFolder, MANIFEST_NAME};
 use crate::export;
-use crate::job_executor::Cancelled;
+use crate::job_executor::{Cancelled, Executor};
 use crate::pyramid::{PyramidSource, make_coarser_shards};
 
 /// What to do after a `--max-bytes` that is too low.
@@ -398,16 +398,18 @@ fn levels(args: &LevelsArgs, cores: &InterruptibleCores) -> Result<()> {
         let spools = [temporary_spool(&path)?, temporary_spool(&path)?];
         let add = |number: usize, file: Vec<u8>| add(number as u32, &file);
         make_coarser_shards(source, shares, process, spools, cores, add).map_err(cancelled_or)?;
+        cores.check_cancelled()?;
         // Another process may have replaced learned.bin meanwhile.
         Ok(stages.check_learned(&id, &LearnedFile::read_id(&stages)?)?)
     };
     let write = || pack_file::write(&path, &key, TileCounts::default(), make);
     thread_pool(encoders)?.install(write)?;
-    print_line(&format!(
-        "{}: {} of {total} shards of coarser levels",
-        path.display(),
-        key.items.len()
-    ))
+    let content = match (key.items.len(), total) {
+        (_, 0) => "is empty; \"assemble\" makes all levels of this picture".to_owned(),
+        (0, _) => format!("is empty; other shares have all {total} shards of coarser levels"),
+        (count, _) => format!("{count} of {total} shards of coarser levels"),
+    };
+    print_line(&format!("{}: {content}", path.display()))
 }
 
 fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
