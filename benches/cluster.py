@@ -44,9 +44,9 @@ SIMULATED_SIDE = 16384
 # Writes when a job of the workflow began and ended. "$2" of `stage STAGE` is the stage.
 RECORDER = """#!/bin/sh
 began=$(date +%s.%N)
-{program} "$@"
+'{program}' "$@"
 status=$?
-echo "$2 $began $(date +%s.%N)" >>{times}
+echo "$2 $began $(date +%s.%N)" >>'{times}'
 exit $status
 """
 
