@@ -192,6 +192,8 @@ fn shards_of_coarser_levels_are_made_by_several_processes() {
     assert!(printed(succeeds(&job.levels_args("2/2"))).contains(&of_two(1)));
     let words = ["1-of-2.pack", "is missing", "stage tiles"];
     fails(&job.levels_args("1/2"), 75, &words);
+    let words = ["1-of-3.pack", "is missing", "packs of 2 shards"];
+    fails(&job.levels_args("2/3"), 75, &words);
     // The first of three processes has none.
     let [one, two] = [1, 2].map(of_two);
     let [none, complete] =

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::pack::Pack;
 use super::shard::Shard;
-use super::stage_folder::{StageFileProblem, StageFolder};
+use super::stage_folder::{StageFileProblem, StageFolder, is_missing};
 use crate::cli::process_resources::InterruptibleCores;
 use crate::cli::recover::prepared_job::PreparedJob;
 use crate::cli::recover::tile_recovery::{TileCounts, decompress_tile};
@@ -33,7 +33,16 @@ impl ShardPacks {
             cores.check_cancelled()?;
             let remedy = stages.command("tiles", &format!(" --shard {shard}"));
             let path = stages.pack(shard);
-            let pack = Pack::open(&path, &shard.pack_key(learned, job), &remedy)?;
+            let pack = Pack::open(&path, &shard.pack_key(learned, job), &remedy);
+            let pack = pack.map_err(|error| match stages.other_count(shard) {
+                Some(found) if is_missing(&error) => {
+                    let remedy = remedy.clone();
+                    StageFileProblem::OtherCount { found, remedy }
+                        .of(&path)
+                        .into()
+                }
+                _ => error,
+            })?;
             let is_of = |plan| pack.heads().iter().all(|head| head.is_of(plan));
             match job.coding.as_ref().is_none_or(is_of) {
                 true => Ok(pack),

@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Error, Result};
 
 use super::shard::Shard;
 use crate::cli::recover::checkpoint_key::PROGRAM;
@@ -20,6 +20,10 @@ pub struct StageFileError {
 pub enum StageFileProblem {
     #[error("is missing; {0} writes it")]
     Missing(String),
+    #[error(
+        "is missing, and there are packs of {found} shards: give that number, or {remedy} writes it"
+    )]
+    OtherCount { found: u32, remedy: String },
     #[error("is incomplete or damaged; {0} writes it again")]
     Damaged(String),
     #[error("is not of this {made_from}; {remedy} writes it again")]
@@ -41,8 +45,12 @@ impl StageFileError {
     /// Whether the same command may succeed later: once another stage has written the file, or with the file that is there
     /// now.
     pub fn may_pass(&self) -> bool {
-        use StageFileProblem::{ChangedWhileRead, Missing, Replaced};
-        matches!(self.problem, ChangedWhileRead | Missing(_) | Replaced)
+        use StageFileProblem::{ChangedWhileRead, Missing, OtherCount, Replaced};
+        let problem = &self.problem;
+        matches!(
+            problem,
+            ChangedWhileRead | Missing(_) | OtherCount { .. } | Replaced
+        )
     }
 }
 
@@ -54,6 +62,12 @@ impl StageFileProblem {
             problem: self,
         }
     }
+}
+
+/// Whether the error is that a stage has not written its file.
+pub fn is_missing(error: &Error) -> bool {
+    let stage_file = error.downcast_ref::<StageFileError>();
+    stage_file.is_some_and(|e| matches!(e.problem, StageFileProblem::Missing(_)))
 }
 
 /// The folder.
@@ -120,6 +134,17 @@ impl StageFolder {
 
     pub fn pack(&self, shard: Shard) -> PathBuf {
         self.shards().join(format!("{}.pack", shard.file_stem()))
+    }
+
+    /// Of how many shards packs are there, if it is another number than that of `shard`.
+    pub fn other_count(&self, shard: Shard) -> Option<u32> {
+        let entries = std::fs::read_dir(self.shards()).ok()?;
+        let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        let counts = names.filter_map(|name| {
+            let (_, count) = name.strip_suffix(".pack")?.split_once("-of-")?;
+            count.parse().ok()
+        });
+        counts.filter(|count| *count != shard.count()).min()
     }
 
     pub fn levels(&self, shard: Shard) -> PathBuf {
