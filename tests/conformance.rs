@@ -18,7 +18,9 @@ use relightable_photo::format::{
     FormatError, FormatExtension, Limits, LtmReader, Metadata, ShardId, Spool,
 };
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::pyramid::{PyramidLayout, PyramidReader, PyramidSource, write_pyramid};
+use relightable_photo::pyramid::{
+    PyramidLayout, PyramidReader, PyramidSource, no_shard, write_pyramid,
+};
 use relightable_photo::relight::{Light, OutputTransform, reference};
 use relightable_photo::transport::{
     Basis, CHANNELS, CameraPixel, Correspondence, Decibels, DisplacementGrid, FloatTile, Geometry,
@@ -269,7 +271,7 @@ fn levels() -> Vec<u8> {
     };
     write_pyramid(
         source,
-        &|_| Ok(None),
+        &no_shard,
         layout,
         spools,
         &SequentialExecutor,

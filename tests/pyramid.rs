@@ -15,7 +15,7 @@ use relightable_photo::format::{
 use relightable_photo::job_executor::SequentialExecutor;
 use relightable_photo::pyramid::{
     FetchShard, LevelShares, PyramidLayout, PyramidReader, PyramidSource, make_coarser_shards,
-    write_pyramid,
+    no_shard, write_pyramid,
 };
 use relightable_photo::relight::{Light, reference};
 use relightable_photo::transport::{
@@ -80,7 +80,7 @@ impl Flat {
 
     /// The same as a file of several levels.
     fn with_levels(&self, levels: u32) -> Vec<u8> {
-        self.with_shards(levels, &|_| Ok(None))
+        self.with_shards(levels, &no_shard)
     }
 
     /// The same as a file of several levels, with shards that are made already.

@@ -10,7 +10,7 @@ use fuzzing::source::ArbitraryInput;
 use image::{DynamicImage, ImageFormat};
 use relightable_photo::format::{EncodingTarget, FormatError, Metadata, Spool};
 use relightable_photo::job_executor::SequentialExecutor;
-use relightable_photo::pyramid::{PyramidLayout, PyramidSource, write_pyramid};
+use relightable_photo::pyramid::{PyramidLayout, PyramidSource, no_shard, write_pyramid};
 use relightable_photo::transport::{
     Basis, Correspondence, Decibels, Extent, FloatTile, Geometry, Window,
 };
@@ -117,7 +117,7 @@ fn levels() -> Result<Vec<u8>, FormatError> {
     };
     write_pyramid(
         source,
-        &|_| Ok(None),
+        &no_shard,
         layout,
         spools,
         &SequentialExecutor,

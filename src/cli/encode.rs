@@ -16,7 +16,7 @@ use super::process_resources::{Interrupted, InterruptibleCores, peak_rss_bytes};
 use super::progress;
 use super::report::{format_bytes, print_json, print_line};
 use crate::format::{ChunkId, FormatError, LevelTable};
-use crate::pyramid::{PyramidLayout, PyramidSource};
+use crate::pyramid::{PyramidLayout, PyramidSource, no_shard};
 
 /// Write a large relightable photograph as one of several levels, of which viewers fetch the part and the level that are
 /// seen
@@ -86,8 +86,7 @@ pub fn run(args: &EncodeArgs) -> Result<()> {
             index: &index,
             fetch: &fetch,
         };
-        let none = |_| Ok(None);
-        let written = write_levels(&args.output, source, &none, layout, &cores, out);
+        let written = write_levels(&args.output, source, &no_shard, layout, &cores, out);
         let table = written.map_err(|error| match error {
             FormatError::Write(_) | FormatError::Spool(_) => error.into(),
             FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => {

@@ -25,5 +25,5 @@ pub use level_shares::LevelShares;
 pub use reader::{PyramidReader, Shard};
 pub use writer::{
     FetchShard, PyramidLayout, SHARD_SIDE, least_level_count, level_count, make_coarser_shards,
-    write_pyramid,
+    no_shard, write_pyramid,
 };

@@ -65,6 +65,14 @@ pub fn least_level_count(camera: Extent, max_side: u32) -> u32 {
 /// Gives the file of a shard that is made already, if it is.
 pub type FetchShard<'a> = dyn Fn(ShardId) -> Result<Option<Vec<u8>>, FormatError> + 'a;
 
+/// A [`FetchShard`] where none is made already.
+///
+/// # Errors
+/// Never.
+pub fn no_shard(_: ShardId) -> Result<Option<Vec<u8>>, FormatError> {
+    Ok(None)
+}
+
 /// Writes a file of one level as one of several. `made` gives the shards that [`make_coarser_shards`] has made; the others
 /// are made here. `spools` are two temporary files.
 ///
@@ -141,7 +149,7 @@ pub fn make_coarser_shards<F: Read + Write + Seek + Send, E: From<FormatError>>(
         for level in 1..=subtree.level {
             let ids = shares.below(subtree, level);
             let fine = level_or_whole(&finer, &whole);
-            let coarse = encoder.level(level, fine, ids, |_| Ok(None))?;
+            let coarse = encoder.level(level, fine, ids, no_shard)?;
             for shard in coarse.shards() {
                 if let Some(at) = shares.number(shard.id) {
                     take(at, coarse.read(shard)?)?;

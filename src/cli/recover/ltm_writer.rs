@@ -1,7 +1,7 @@
 //! Encodes recovered tiles and writes the `.ltm` file.
 
 use std::fs::File;
-use std::io::{self, ErrorKind};
+use std::io;
 use std::path::Path;
 use std::time::Instant;
 
@@ -14,12 +14,11 @@ use super::report::RecoverReport;
 use super::tile_recovery::TileCounts;
 use crate::cli::levels_output::{temporary_spool, write_levels};
 use crate::cli::output_file::{LTM, OutputFile};
-use crate::cli::process_resources::{InterruptibleCores, thread_pool};
+use crate::cli::process_resources::{InterruptibleCores, cancelled_or, thread_pool};
 use crate::cli::progress;
 use crate::export::{self, EncodingMemory, FileQuality};
 use crate::format::{ChunkStore, EncodedFile, FormatError, Metadata, ShardId, SpooledChunks};
-use crate::job_executor::Cancelled;
-use crate::pyramid::{PyramidLayout, PyramidSource};
+use crate::pyramid::{PyramidLayout, PyramidSource, no_shard};
 use crate::transport::Decibels;
 
 /// Share of the bytes that the finest of several levels usually takes.
@@ -65,8 +64,8 @@ pub trait FileTiles: Sync {
     ///
     /// # Errors
     /// If it cannot be read.
-    fn level_shard(&self, _: ShardId) -> Result<Option<Vec<u8>>, FormatError> {
-        Ok(None)
+    fn level_shard(&self, shard: ShardId) -> Result<Option<Vec<u8>>, FormatError> {
+        no_shard(shard)
     }
 }
 
@@ -113,7 +112,7 @@ struct LtmWriter<'a, T> {
 /// Writes the file of `tiles`, as `recover` and its last stage do. `counts` are those of the tiles.
 ///
 /// # Errors
-/// If there is a warning and `--strict`, and if the file cannot be written. An interruption is reported as [`Cancelled`].
+/// If there is a warning and `--strict`, and if the file cannot be written. An interruption is reported as [`Cancelled`](crate::job_executor::Cancelled).
 pub fn finish(
     start: Instant,
     inputs: &RecoveryInputs<'_>,
@@ -149,7 +148,7 @@ pub struct WrittenFile {
 }
 
 impl<T: FileTiles> LtmWriter<'_, T> {
-    /// Encodes the tiles and writes the file. An interruption is reported as [`Cancelled`].
+    /// Encodes the tiles and writes the file. An interruption is reported as [`Cancelled`](crate::job_executor::Cancelled).
     fn write(&self) -> Result<WrittenFile> {
         let WriterInput {
             job, destination, ..
@@ -222,7 +221,6 @@ impl<T: FileTiles> LtmWriter<'_, T> {
     fn writing_error(&self, error: FormatError, max_bytes: u64) -> Error {
         let output = self.input.destination.output.display();
         match error {
-            FormatError::Source(e) if e.kind() == ErrorKind::Interrupted => Cancelled.into(),
             FormatError::TooLarge { limit, smallest } => {
                 // A file of several levels has a smaller limit for the finest one.
                 let smallest =
@@ -233,7 +231,7 @@ impl<T: FileTiles> LtmWriter<'_, T> {
                     self.input.destination.too_large_remedy
                 ))
             }
-            other => Error::new(other).context(output.to_string()),
+            other => cancelled_or(Error::new(other).context(output.to_string())),
         }
     }
 }

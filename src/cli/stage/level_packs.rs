@@ -1,16 +1,12 @@
 //! The shards of coarser levels that `stage levels` makes, for the file.
 
-use std::ops::Range;
+use anyhow::Result;
 
-use anyhow::{Error, Result};
-
-use super::StageFileError;
 use super::pack::Pack;
 use super::pack_file::{PackKey, PackKind};
 use super::shard::Shard;
-use super::stage_folder::{StageFileProblem, StageFolder};
+use super::stage_folder::{StageFolder, is_missing};
 use crate::cli::process_resources::InterruptibleCores;
-use crate::cli::recover::checkpoint_key::PROGRAM;
 use crate::cli::recover::prepared_job::PreparedJob;
 use crate::export;
 use crate::format::{FormatError, ShardId};
@@ -39,15 +35,9 @@ pub fn level_shares(
 /// The key of a process's pack of `shares`; `learned` is the id of `learned.bin`.
 pub fn level_key(shard: Shard, learned: &str, shares: Option<&LevelShares>) -> PackKey {
     let share = shares.map_or(0..0, |shares| shares.share(shard.index()));
-    let Range { start, end } = share;
-    PackKey {
-        program: PROGRAM.to_owned(),
-        learned: learned.to_owned(),
-        kind: PackKind::LevelShards {
-            root_level: shares.map_or(0, LevelShares::root_level),
-        },
-        items: start as u32..end as u32,
-    }
+    let root_level = shares.map_or(0, LevelShares::root_level);
+    let kind = PackKind::LevelShards { root_level };
+    PackKey::new(learned, kind, share.start as u32..share.end as u32)
 }
 
 /// The packs of those processes that have made theirs.
@@ -95,10 +85,4 @@ impl LevelPacks {
         let file = self.packs.iter().find_map(|pack| pack.item(number));
         file.transpose().map_err(FormatError::Source)
     }
-}
-
-/// Whether nobody has made a pack, which is no fault.
-fn is_missing(error: &Error) -> bool {
-    let stage_file = error.downcast_ref::<StageFileError>();
-    stage_file.is_some_and(|e| matches!(e.problem, StageFileProblem::Missing(_)))
 }

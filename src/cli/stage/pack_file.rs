@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use super::encoded_record;
 use crate::cli::output_file::{FileSignature, OutputFile};
 use crate::cli::records::{Record, RecordReader, encode_record};
+use crate::cli::recover::checkpoint_key::PROGRAM;
 use crate::cli::recover::tile_recovery::TileCounts;
 use crate::format::EncodedTileHead;
 
@@ -43,6 +44,18 @@ pub struct PackKey {
     /// [`LevelShares`](crate::pyramid::LevelShares). None if there are more processes
     /// than items, or nothing to share.
     pub items: Range<u32>,
+}
+
+impl PackKey {
+    /// A key of this program; `learned` is the id of `learned.bin`.
+    pub fn new(learned: &str, kind: PackKind, items: Range<u32>) -> Self {
+        Self {
+            program: PROGRAM.to_owned(),
+            learned: learned.to_owned(),
+            kind,
+            items,
+        }
+    }
 }
 
 /// What an item is.

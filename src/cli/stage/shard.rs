@@ -4,7 +4,6 @@ use std::fmt;
 use std::ops::Range;
 
 use super::pack_file::{PackKey, PackKind};
-use crate::cli::recover::checkpoint_key::PROGRAM;
 use crate::cli::recover::prepared_job::PreparedJob;
 use crate::export::{self, FILE_TILE_SIDE};
 use crate::transport::Geometry;
@@ -90,27 +89,23 @@ impl Shard {
     /// The key of its recovered tiles; `learned` is the id of `learned.bin`.
     pub fn recovered_key(self, learned: &str, geometry: &Geometry) -> PackKey {
         let (rows, columns) = (self.tile_rows(geometry), geometry.tile_grid().width);
-        PackKey {
-            program: PROGRAM.to_owned(),
-            learned: learned.to_owned(),
-            kind: PackKind::RecoveredTiles,
-            items: rows.start * columns..rows.end * columns,
-        }
+        let tiles = rows.start * columns..rows.end * columns;
+        PackKey::new(learned, PackKind::RecoveredTiles, tiles)
     }
 
     /// The key of its pack: of encoded tiles, if the job has a coding plan.
     pub fn pack_key(self, learned: &str, job: &PreparedJob) -> PackKey {
-        let key = self.recovered_key(learned, job.recovery.geometry());
+        let geometry = job.recovery.geometry();
         if job.coding.is_none() {
-            return key;
+            return self.recovered_key(learned, geometry);
         }
         let columns = export::file_geometry(&job.recovery).tile_grid().width;
-        let [start, end] = self.file_tile_rows(job.recovery.geometry());
-        PackKey {
-            kind: PackKind::EncodedTiles,
-            items: start * columns..end * columns,
-            ..key
-        }
+        let [start, end] = self.file_tile_rows(geometry);
+        PackKey::new(
+            learned,
+            PackKind::EncodedTiles,
+            start * columns..end * columns,
+        )
     }
 }
 
