@@ -207,6 +207,27 @@ struct PlannedCapture {
     capture: CaptureFolder,
 }
 
+impl PlannedCapture {
+    /// What it is recovered from, and what was learned of it.
+    ///
+    /// # Errors
+    /// Those of [`RecoveryInputs::new`] and [`LearnedFile::read`].
+    fn learned(&self) -> Result<(RecoveryInputs<'_>, LearnedFile)> {
+        let inputs = RecoveryInputs::new(&self.capture, &self.plan.options)?;
+        let learned = LearnedFile::read(&self.stages, &self.plan, &inputs)?;
+        Ok((inputs, learned))
+    }
+
+    /// Whether `learned.bin` still has this id: a plan that has changed meanwhile has files of its own.
+    ///
+    /// # Errors
+    /// [`StageFileError`] if it has not.
+    fn check_learned(&self, id: &str) -> Result<()> {
+        let current = LearnedFile::read_id(&self.stages)?;
+        Ok(self.stages.check_learned(id, &current)?)
+    }
+}
+
 impl Folders {
     /// Reads the plan and opens its capture.
     ///
@@ -282,22 +303,18 @@ fn learn(args: &LearnArgs, cores: &InterruptibleCores) -> Result<()> {
 }
 
 fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
-    let PlannedCapture {
-        stages,
-        plan,
-        capture,
-    } = args.folders.open(Comparison::Records, cores)?;
+    let planned = args.folders.open(Comparison::Records, cores)?;
+    let stages = &planned.stages;
     // Copies of folders may lack empty ones.
     StageFolder::create(&args.folders.folder)?;
-    let inputs = RecoveryInputs::new(&capture, &plan.options)?;
-    let LearnedFile { id, job } = LearnedFile::read(&stages, &plan, &inputs)?;
+    let (inputs, LearnedFile { id, job }) = planned.learned()?;
     let geometry = job.recovery.geometry();
     let key = args.shard.pack_key(&id, &job);
     let path = stages.pack(args.shard);
     let verify = || Pack::open(&path, &key, "");
     let print_complete = || print_line(&format!("{}: is complete", path.display()));
     let recovered = args.shard.recovered_key(&id, geometry);
-    let sink = PartialShard::open(&stages, args.shard, &recovered)?;
+    let sink = PartialShard::open(stages, args.shard, &recovered)?;
     if is_complete(verify())? {
         sink.remove()?;
         return print_complete();
@@ -317,15 +334,14 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
         cores,
     };
     let recover = || {
-        let photographs = TilePhotographs::of_capture(&capture, &job)?;
+        let photographs = TilePhotographs::of_capture(&planned.capture, &job)?;
         let recovery = TileRecovery { job: &job, source };
         recovery.run(photographs, args.shard.tile_rows(geometry), &sink)
     };
     let finished = thread_pool(memory.tiles_at_once())?
         .install(recover)
         .and_then(|counts| {
-            // A plan that has changed meanwhile has packs of its own.
-            stages.check_learned(&id, &LearnedFile::read_id(&stages)?)?;
+            planned.check_learned(&id)?;
             let tiles = ShardTiles {
                 job: &job,
                 recovered: &sink,
@@ -354,14 +370,10 @@ fn tiles(args: &TilesArgs, cores: &InterruptibleCores) -> Result<()> {
 }
 
 fn levels(args: &LevelsArgs, cores: &InterruptibleCores) -> Result<()> {
-    let PlannedCapture {
-        stages,
-        plan,
-        capture,
-    } = args.folders.open(Comparison::Records, cores)?;
+    let planned = args.folders.open(Comparison::Records, cores)?;
+    let stages = &planned.stages;
     StageFolder::create(&args.folders.folder)?;
-    let inputs = RecoveryInputs::new(&capture, &plan.options)?;
-    let LearnedFile { id, job } = LearnedFile::read(&stages, &plan, &inputs)?;
+    let (inputs, LearnedFile { id, job }) = planned.learned()?;
     let shares = level_shares(&job, inputs.levels, args.shard.count())?;
     let key = level_key(args.shard, &id, shares.as_ref());
     let path = stages.levels(args.shard);
@@ -382,7 +394,7 @@ fn levels(args: &LevelsArgs, cores: &InterruptibleCores) -> Result<()> {
         let process = args.shard.index();
         let rows = shares.rows(process);
         let shards = Shard::all(args.shard.count()).filter(|shard| shard.has_rows(&rows, geometry));
-        let packs = ShardPacks::open(&stages, &id, &job, shards, cores)?;
+        let packs = ShardPacks::open(stages, &id, &job, shards, cores)?;
         let tiles = EncodedTiles {
             packs: &packs,
             plan: coding,
@@ -399,8 +411,7 @@ fn levels(args: &LevelsArgs, cores: &InterruptibleCores) -> Result<()> {
         let add = |number: usize, file: Vec<u8>| add(number as u32, &file);
         make_coarser_shards(source, shares, process, spools, cores, add).map_err(cancelled_or)?;
         cores.check_cancelled()?;
-        // Another process may have replaced learned.bin meanwhile.
-        Ok(stages.check_learned(&id, &LearnedFile::read_id(&stages)?)?)
+        planned.check_learned(&id)
     };
     let write = || pack_file::write(&path, &key, TileCounts::default(), make);
     thread_pool(encoders)?.install(write)?;
@@ -415,17 +426,13 @@ fn levels(args: &LevelsArgs, cores: &InterruptibleCores) -> Result<()> {
 fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
     let start = Instant::now();
     drop(OutputFile::create(&args.output, &LTM)?);
-    let PlannedCapture {
-        stages,
-        plan,
-        capture,
-    } = args.folders.open(Comparison::Contents, cores)?;
-    let inputs = RecoveryInputs::new(&capture, &plan.options)?;
-    let LearnedFile { id, mut job } = LearnedFile::read(&stages, &plan, &inputs)?;
+    let planned = args.folders.open(Comparison::Contents, cores)?;
+    let stages = &planned.stages;
+    let (inputs, LearnedFile { id, mut job }) = planned.learned()?;
     job.findings.print_further();
-    let packs = ShardPacks::open(&stages, &id, &job, Shard::all(args.shards), cores)?;
+    let packs = ShardPacks::open(stages, &id, &job, Shard::all(args.shards), cores)?;
     let levels = level_shares(&job, inputs.levels, args.shards)?
-        .map(|shares| LevelPacks::open(&stages, &id, shares, args.shards, cores))
+        .map(|shares| LevelPacks::open(stages, &id, shares, args.shards, cores))
         .transpose()?;
     let destination = Destination {
         output: &args.output,
@@ -452,6 +459,6 @@ fn assemble(args: &AssembleArgs, cores: &InterruptibleCores) -> Result<()> {
     };
     match args.json {
         true => print_json(&report),
-        false => report.print(&args.output, capture.manifest()),
+        false => report.print(&args.output, planned.capture.manifest()),
     }
 }
