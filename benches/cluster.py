@@ -57,6 +57,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="cluster-bench-") as temporary:
         folder = Path(temporary)
         capture = args.capture or repeated_capture(args, folder)
+        extent = json.loads((capture / "capture.json").read_text(encoding="utf-8"))["camera"]
         peer, expected = recover(args.program, capture, folder)
         report = {"recover_s": peer, "shards": args.shards}
         for cores in (1, 2):
@@ -72,7 +73,6 @@ def main():
     overhead = (report["workflow_1_s"] - sum(map(sum, durations.values()))) / jobs
     report["overhead_s"] = overhead
     report["simulated_s"] = {cores: makespan(durations, cores, overhead) for cores in (1, 2)}
-    extent = json.loads((capture / "capture.json").read_text(encoding="utf-8"))["camera"]
     large = enlarged(durations, SIMULATED_SIDE**2 / (extent["width"] * extent["height"]))
     report["simulated_large_s"] = {cores: makespan(large, cores, overhead) for cores in (1, *SIMULATED_CORES)}
     print_report(report)
