@@ -362,7 +362,7 @@ fn several_processes_make_the_shards_of_one() {
             assert!(flat.with_shards(levels, &made) == expected);
         }
     }
-    // What is made already is not made again.
+    // The writer copies shards that other processes made.
     let coarse = Flat::new(wide.clone(), 3, EncodingTarget::Snr(Decibels(20.0)));
     let flat = Flat::new(wide.clone(), 3, snr);
     let shares = LevelShares::new(layout(4).table(&wide).unwrap(), 1);

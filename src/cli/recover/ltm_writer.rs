@@ -112,7 +112,8 @@ struct LtmWriter<'a, T> {
 /// Writes the file of `tiles`, as `recover` and its last stage do. `counts` are those of the tiles.
 ///
 /// # Errors
-/// If there is a warning and `--strict`, and if the file cannot be written. An interruption is reported as [`Cancelled`](crate::job_executor::Cancelled).
+/// If there is a warning and `--strict`, and if the file cannot be written. An interruption is reported as
+/// [`Cancelled`](crate::job_executor::Cancelled).
 pub fn finish(
     start: Instant,
     inputs: &RecoveryInputs<'_>,
@@ -148,7 +149,8 @@ pub struct WrittenFile {
 }
 
 impl<T: FileTiles> LtmWriter<'_, T> {
-    /// Encodes the tiles and writes the file. An interruption is reported as [`Cancelled`](crate::job_executor::Cancelled).
+    /// Encodes the tiles and writes the file. An interruption is reported as
+    /// [`Cancelled`](crate::job_executor::Cancelled).
     fn write(&self) -> Result<WrittenFile> {
         let WriterInput {
             job, destination, ..

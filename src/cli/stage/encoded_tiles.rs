@@ -69,20 +69,26 @@ impl<'a> EncodedTiles<'a> {
         geometry: Geometry,
         metadata: &Metadata,
     ) -> Result<EncodedFile<PackedChunks<'a>>, FormatError> {
-        let tiles = geometry.tile_grid().area();
         let dark = EncodedTileHead::dark(self.plan);
         let head = |i| self.packs.chunks(i).map_or(&dark, |(_, head, _)| head);
-        let heads = (0..tiles).map(head);
-        EncodedFile::of_tiles(self.plan, geometry, heads, self.chunks(tiles), metadata)
+        let heads = (0..geometry.tile_grid().area()).map(head);
+        self.file(geometry, heads, metadata)
     }
 
-    fn chunks(&self, tiles: usize) -> PackedChunks<'a> {
-        PackedChunks {
+    /// The file of one level; `heads` are those of all tiles.
+    fn file<'h>(
+        &self,
+        geometry: Geometry,
+        heads: impl Iterator<Item = &'h EncodedTileHead>,
+        metadata: &Metadata,
+    ) -> Result<EncodedFile<PackedChunks<'a>>, FormatError> {
+        let chunks = PackedChunks {
             packs: self.packs,
-            tiles,
+            tiles: geometry.tile_grid().area(),
             basis: Vec::new(),
             cores: self.cores,
-        }
+        };
+        EncodedFile::of_tiles(self.plan, geometry, heads, chunks, metadata)
     }
 }
 
@@ -95,14 +101,7 @@ impl<'a> FileTiles for EncodedTiles<'a> {
         _: FileQuality,
     ) -> Result<EncodedFile<Self::Store>, FormatError> {
         let geometry = export::file_geometry(&input.job.recovery);
-        let chunks = self.chunks(geometry.tile_grid().area());
-        EncodedFile::of_tiles(
-            self.plan,
-            geometry,
-            self.packs.heads(),
-            chunks,
-            input.metadata,
-        )
+        self.file(geometry, self.packs.heads(), input.metadata)
     }
 
     fn level_shard(&self, shard: ShardId) -> Result<Option<Vec<u8>>, FormatError> {

@@ -208,7 +208,7 @@ struct PlannedCapture {
 }
 
 impl PlannedCapture {
-    /// What it is recovered from, and what was learned of it.
+    /// The inputs of its recovery, and the content of `learned.bin`.
     ///
     /// # Errors
     /// Those of [`RecoveryInputs::new`] and [`LearnedFile::read`].

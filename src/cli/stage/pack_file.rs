@@ -41,8 +41,7 @@ pub struct PackKey {
     pub learned: String,
     pub kind: PackKind,
     /// Numbers of its items among those of this kind: of tiles, row by row; of shards of coarser levels, in their
-    /// [`LevelShares`](crate::pyramid::LevelShares). None if there are more processes
-    /// than items, or nothing to share.
+    /// [`LevelShares`](crate::pyramid::LevelShares). Empty if there are more processes than items, or nothing to share.
     pub items: Range<u32>,
 }
 

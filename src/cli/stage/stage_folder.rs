@@ -108,7 +108,7 @@ impl StageFolder {
         format!("\"ltm-export stage {stage} {}{options}\"", self.0.display())
     }
 
-    /// Whether what is learned now, by its id, is what a shard was made with.
+    /// Whether `learned.bin` has the id that a shard was made with: the `current` id is the `used` one.
     ///
     /// # Errors
     /// [`StageFileError`] if it is not.
