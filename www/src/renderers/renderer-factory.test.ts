@@ -14,6 +14,7 @@ import { gpuRenderers } from './gpu/create-gpu-renderer.js';
 import type { Devices, LoadGraphics } from './gpu/devices.js';
 import { rendererFactory } from './renderer-factory.js';
 import { PLAIN, withBackends, withExposure } from './settings-fakes.js';
+import type { BackendPreferences } from './types.js';
 
 const SETTINGS: SessionSettings = {
   src: 'a.ltm',
@@ -54,7 +55,7 @@ function fakeDevices(tilesInModules: ReadonlySet<number>) {
   const created: string[] = [];
   /** Devices that are available once `open` resolves. WebGL2 is a software renderer. */
   const createDevices = (open: (backend: Backend) => Promise<void>) => {
-    const lease = async (_: unknown, backend: Backend, software: boolean) => {
+    const lease = async (_: unknown, backend: Backend, { software }: BackendPreferences) => {
       await open(backend);
       if (backend === 'webgl2' && !software)
         throw new PhotoError('backend-unavailable', 'a software renderer');

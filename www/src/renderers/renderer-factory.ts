@@ -36,21 +36,21 @@ export function rendererFactory({
     whenIdle(() => Promise.allSettled([cpuModule(), cpu()]));
     return renderer;
   };
-  const warmUp = async (backend: Backend, software: boolean, signal: AbortSignal) => {
+  const warmUp = async (backend: Backend, preferences: BackendPreferences, signal: AbortSignal) => {
     if (backend !== 'cpu') {
       const renderers = await gpu();
-      return signal.aborted ? () => {} : await renderers.warmUp(backend, software);
+      return signal.aborted ? () => {} : await renderers.warmUp(backend, preferences);
     }
     // Workers that start earlier would wait for the module that the page is still fetching.
     const [renderers] = await Promise.all([cpu(), cpuModule()]);
     return signal.aborted ? () => {} : renderers.warmUp();
   };
   /** Warms up the first backend that works until `signal` is aborted. Errors are left to `createRenderer`. */
-  const prepare = async ({ backends, software }: BackendPreferences, signal: AbortSignal) => {
-    for (const backend of backends) {
+  const prepare = async (preferences: BackendPreferences, signal: AbortSignal) => {
+    for (const backend of preferences.backends) {
       if (signal.aborted) return;
       try {
-        const release = await warmUp(backend, software, signal);
+        const release = await warmUp(backend, preferences, signal);
         if (signal.aborted) release();
         else signal.addEventListener('abort', release);
         return;

@@ -3,7 +3,7 @@
 import type { LoadedPhotograph } from '../../photo/photograph.js';
 import { createModuleRenderer } from '../module-renderer.js';
 import type { BackendPreferences, Renderer } from '../types.js';
-import { Devices, type LoadGraphics } from './devices.js';
+import { type DevicePreferences, Devices, type LoadGraphics } from './devices.js';
 import type { GraphicsBackendName } from './graphics-ports.js';
 
 export type GpuRendererFactory = ReturnType<typeof gpuRenderers>;
@@ -13,11 +13,11 @@ export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
     async create(
       backend: GraphicsBackendName,
       photograph: LoadedPhotograph,
-      { gamut, software }: BackendPreferences,
+      preferences: BackendPreferences,
       onLost: (reason: string) => void,
       signal: AbortSignal,
     ): Promise<Renderer> {
-      const lease = await devices.lease(load, backend, software, onLost);
+      const lease = await devices.lease(load, backend, preferences, onLost);
       try {
         signal.throwIfAborted();
         const module = await load(backend);
@@ -25,7 +25,7 @@ export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
           module,
           async (photo) => {
             const canvas = document.createElement('canvas');
-            const relighter = await lease.graphics.draw(photo, canvas, gamut);
+            const relighter = await lease.graphics.draw(photo, canvas, preferences.gamut);
             return createModuleRenderer(module, photograph, relighter, canvas, lease);
           },
           { signal },
@@ -36,8 +36,11 @@ export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
       }
     },
     /** Opens a device. The returned function releases it. */
-    async warmUp(backend: GraphicsBackendName, software: boolean): Promise<() => void> {
-      return (await devices.lease(load, backend, software, () => {})).release;
+    async warmUp(
+      backend: GraphicsBackendName,
+      preferences: DevicePreferences,
+    ): Promise<() => void> {
+      return (await devices.lease(load, backend, preferences, () => {})).release;
     },
   };
 }

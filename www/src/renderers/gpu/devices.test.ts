@@ -1,8 +1,13 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { GraphicsDevice } from '../../engine/wasm-exports.js';
-import { Devices, type LoadGraphics } from './devices.js';
+import { Deferred } from '../../shared/promises.js';
+import { type DevicePreferences, Devices, type LoadGraphics } from './devices.js';
 import type { GraphicsPorts } from './graphics-ports.js';
+
+const backends = ['webgpu', 'webgl2', 'cpu'] as const;
+const SOFTWARE = { backends, software: true };
+const NO_SOFTWARE = { backends, software: false };
 
 const settle = () => new Promise((resolve) => setImmediate(resolve));
 
@@ -14,6 +19,7 @@ function fakeDevices() {
   let now = 0;
   let openError: Error | null = null;
   let silent = false;
+  let opens: Promise<void> = Promise.resolve();
   let unanswered = 0;
   const device = (name: string, lost: GraphicsDevice['lost']): GraphicsDevice => ({
     kernel: name,
@@ -29,6 +35,7 @@ function fakeDevices() {
           unanswered += 1;
           return new Promise<never>(() => {});
         }
+        await opens;
         const number = losses.length;
         const lost = new Promise<{ message: string }>((resolve) => {
           losses.push((message) => resolve({ message }));
@@ -78,6 +85,12 @@ function fakeDevices() {
     setError: (error: Error | null) => {
       openError = error;
     },
+    /** Devices open once the returned function is called. */
+    openLate: () => {
+      const late = new Deferred();
+      opens = late.promise;
+      return late.resolve;
+    },
     fallSilent: () => {
       silent = true;
     },
@@ -88,7 +101,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
   test(`simultaneous leases of ${backend} share a device, which is freed with the last`, async () => {
     const f = fakeDevices();
     const leases = await Promise.all(
-      ['a', 'b', 'c'].map((name) => f.devices.lease(f.load, backend, true, f.onLost(name))),
+      ['a', 'b', 'c'].map((name) => f.devices.lease(f.load, backend, SOFTWARE, f.onLost(name))),
     );
     assert.equal(new Set(leases.map(({ graphics }) => graphics)).size, 1);
     for (const { release } of leases.slice(1)) release();
@@ -103,7 +116,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     f.canvases[0]?.lose();
     await settle();
     assert.deepEqual(f.takeLog(), []);
-    const next = await f.devices.lease(f.load, backend, true, f.onLost('d'));
+    const next = await f.devices.lease(f.load, backend, SOFTWARE, f.onLost('d'));
     assert.equal(next.graphics.kernel, `${backend} 1`);
   });
 
@@ -112,7 +125,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     const lose = (i: number) =>
       backend === 'webgpu' ? f.losses[i]?.('gone.') : f.canvases[i]?.lose();
     const leases = await Promise.all(
-      ['a', 'b'].map((name) => f.devices.lease(f.load, backend, true, f.onLost(name))),
+      ['a', 'b'].map((name) => f.devices.lease(f.load, backend, SOFTWARE, f.onLost(name))),
     );
     lose(0);
     lose(0);
@@ -120,7 +133,7 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
     leases[0]?.fail('a draw failed');
     const reason = backend === 'webgpu' ? 'gone.' : 'the browser took it away.';
     assert.deepEqual(f.takeLog().sort(), [`a: ${reason}`, `b: ${reason}`, `free ${backend} 0`]);
-    const next = await f.devices.lease(f.load, backend, true, f.onLost('c'));
+    const next = await f.devices.lease(f.load, backend, SOFTWARE, f.onLost('c'));
     for (const { release } of leases) release();
     await settle();
     assert.deepEqual(f.takeLog(), [], 'the lost device does not affect the next');
@@ -133,20 +146,20 @@ for (const backend of ['webgpu', 'webgl2'] as const) {
 test('a device that is lost repeatedly is refused for a minute', async () => {
   const f = fakeDevices();
   for (let i = 0; i < 3; i += 1) {
-    await f.devices.lease(f.load, 'webgpu', true, f.onLost('a'));
+    await f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('a'));
     f.losses[i]?.('gone.');
     await settle();
     f.pass(10_000);
   }
   const refused = { code: 'backend-unavailable', message: /lost 3 times/ };
-  await assert.rejects(f.devices.lease(f.load, 'webgpu', true, f.onLost('a')), refused);
+  await assert.rejects(f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('a')), refused);
   assert.ok(
-    await f.devices.lease(f.load, 'webgl2', true, f.onLost('a')),
+    await f.devices.lease(f.load, 'webgl2', SOFTWARE, f.onLost('a')),
     'the other backend is available',
   );
   f.pass(60_000);
   for (let i = 3; i < 8; i += 1) {
-    await f.devices.lease(f.load, 'webgpu', true, f.onLost('a'));
+    await f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('a'));
     f.losses[i]?.('gone.');
     await settle();
     f.pass(70_000);
@@ -157,20 +170,20 @@ test('a device that failed to open is opened again by the next lease', async () 
   for (const backend of ['webgpu', 'webgl2'] as const) {
     const f = fakeDevices();
     f.setError(new Error('none here'));
-    await assert.rejects(f.devices.lease(f.load, backend, true, f.onLost('a')), /none here/);
+    await assert.rejects(f.devices.lease(f.load, backend, SOFTWARE, f.onLost('a')), /none here/);
     f.setError(null);
-    assert.ok(await f.devices.lease(f.load, backend, true, f.onLost('a')));
+    assert.ok(await f.devices.lease(f.load, backend, SOFTWARE, f.onLost('a')));
   }
 });
 
 test('a browser that does not answer has no device', async () => {
   const f = fakeDevices();
   f.fallSilent();
-  const asked = f.devices.lease(f.load, 'webgpu', true, f.onLost('a'));
+  const asked = f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('a'));
   const message = /does not answer within/;
   await assert.rejects(asked, { code: 'backend-unavailable', message });
   // The next lease does not wait.
-  const again = f.devices.lease(f.load, 'webgpu', true, f.onLost('b'));
+  const again = f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('b'));
   await assert.rejects(again, { code: 'backend-unavailable', message });
   assert.equal(f.unanswered(), 1);
 });
@@ -180,13 +193,13 @@ test('without a device its module is not loaded, and the next lease asks again',
     const f = fakeDevices();
     f.setName(null);
     const load = (() => assert.fail('it is not needed')) as unknown as LoadGraphics;
-    await assert.rejects(f.devices.lease(load, backend, true, f.onLost('a')), {
+    await assert.rejects(f.devices.lease(load, backend, SOFTWARE, f.onLost('a')), {
       code: 'backend-unavailable',
       message: /has no device/,
     });
     f.setName('A real device');
-    assert.ok(await f.devices.lease(f.load, backend, true, f.onLost('a')));
-    await f.devices.lease(f.load, backend, true, f.onLost('b'));
+    assert.ok(await f.devices.lease(f.load, backend, SOFTWARE, f.onLost('a')));
+    await f.devices.lease(f.load, backend, SOFTWARE, f.onLost('b'));
     assert.equal(f.nameRequests(), 2, 'a name is kept');
   }
 });
@@ -200,16 +213,16 @@ test('the module of a software renderer is loaded only on request', async () => 
     const f = fakeDevices();
     f.setName(name);
     const load = (() => assert.fail('it is not needed')) as unknown as LoadGraphics;
-    const refused = f.devices.lease(load, 'webgl2', false, f.onLost('a'));
+    const refused = f.devices.lease(load, 'webgl2', NO_SOFTWARE, f.onLost('a'));
     await assert.rejects(refused, {
       code: 'backend-unavailable',
       message: /software renderer/,
     });
-    assert.ok(await f.devices.lease(f.load, 'webgl2', true, f.onLost('b')));
+    assert.ok(await f.devices.lease(f.load, 'webgl2', SOFTWARE, f.onLost('b')));
   }
   const f = fakeDevices();
   f.setName('nvidia lovelace');
-  assert.ok(await f.devices.lease(f.load, 'webgpu', false, f.onLost('a')));
+  assert.ok(await f.devices.lease(f.load, 'webgpu', NO_SOFTWARE, f.onLost('a')));
 });
 
 test('a browser that does not give a name has no device', async () => {
@@ -220,7 +233,7 @@ test('a browser that does not give a name has no device', async () => {
     now: () => 0,
   };
   const devices = new Devices(ports, 20);
-  await assert.rejects(devices.lease(f.load, 'webgpu', true, f.onLost('a')), {
+  await assert.rejects(devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('a')), {
     code: 'backend-unavailable',
     message: /does not answer within/,
   });
@@ -241,21 +254,54 @@ test('a browser that answers late is asked again', async () => {
     now: () => 0,
   };
   const devices = new Devices(ports, 20);
-  const lease = () => devices.lease(f.load, 'webgpu', true, f.onLost('a'));
+  const lease = () => devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('a'));
   await assert.rejects(lease(), /does not answer within/);
   answer('A real device');
   await settle();
   assert.ok(await lease());
 });
 
+test('a browser that answers late is waited for where no other backend is left', async () => {
+  const f = fakeDevices();
+  const name = new Deferred<string>();
+  const ports = { nameOf: () => name.promise, createCanvas: assert.fail, now: () => 0 };
+  const devices = new Devices(ports, 20);
+  const lease = (preferences: DevicePreferences) =>
+    devices.lease(f.load, 'webgpu', preferences, f.onLost('a'));
+  const patient = lease({ backends: ['webgpu'], software: true });
+  await assert.rejects(lease(SOFTWARE), /does not answer within 0.02 seconds/);
+  const alsoPatient = lease({ backends: ['webgpu'], software: true });
+  name.resolve('A real device');
+  assert.equal((await patient).graphics, (await alsoPatient).graphics);
+  const silent = { ...ports, nameOf: () => new Promise<never>(() => {}) };
+  const impatient = new Devices(silent, 20, 30);
+  await assert.rejects(
+    impatient.lease(f.load, 'webgpu', { backends: ['webgpu'], software: true }, f.onLost('b')),
+    /does not answer within 0.03 seconds/,
+  );
+});
+
+test('a device that opens after the time limit is freed', async () => {
+  const f = fakeDevices();
+  const open = f.openLate();
+  await assert.rejects(
+    f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('a')),
+    /does not answer within/,
+  );
+  open();
+  await settle();
+  assert.deepEqual(f.takeLog(), ['free webgpu 0']);
+  assert.ok(await f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('a')));
+});
+
 test('the name is asked again after a loss', async () => {
   const f = fakeDevices();
-  await f.devices.lease(f.load, 'webgpu', false, f.onLost('a'));
+  await f.devices.lease(f.load, 'webgpu', NO_SOFTWARE, f.onLost('a'));
   f.setName('google swiftshader');
   f.losses[0]?.('gone.');
   await settle();
   await assert.rejects(
-    f.devices.lease(f.load, 'webgpu', false, f.onLost('a')),
+    f.devices.lease(f.load, 'webgpu', NO_SOFTWARE, f.onLost('a')),
     /software renderer/,
   );
 });

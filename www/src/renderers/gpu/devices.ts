@@ -6,6 +6,7 @@
 import type { GraphicsDevice, GraphicsModules } from '../../engine/wasm-exports.js';
 import { PhotoError } from '../../shared/errors.js';
 import { withTimeout } from '../../shared/promises.js';
+import type { BackendPreferences } from '../types.js';
 import {
   BROWSER_GRAPHICS,
   type GraphicsBackendName,
@@ -13,6 +14,8 @@ import {
 } from './graphics-ports.js';
 
 export type LoadGraphics = <N extends GraphicsBackendName>(name: N) => Promise<GraphicsModules[N]>;
+
+export type DevicePreferences = Pick<BackendPreferences, 'backends' | 'software'>;
 
 /** A photograph's use of a device. Free its relighter before `release`. */
 export interface DeviceLease {
@@ -33,8 +36,10 @@ interface SharedDevice {
 /** After this many losses, with less than `LOSS_MEMORY_MS` between two of them, leases are refused. */
 const MAX_LOSSES = 3;
 const LOSS_MEMORY_MS = 60_000;
-/** Some browsers never answer a request for WebGPU. */
+/** Some browsers never answer a request for WebGPU. Then the next backend is tried. */
 const MAX_ANSWER_MS = 10_000;
+/** Waiting costs nothing while no other backend is left, and a software renderer on a busy machine is slow to open. */
+const MAX_LAST_ANSWER_MS = 60_000;
 
 const SOFTWARE_RENDERERS = /swiftshader|llvmpipe|lavapipe|softpipe|basic render|software/i;
 
@@ -42,29 +47,34 @@ export class Devices {
   readonly #devices = new Map<GraphicsBackendName, SharedDevice>();
   /** The names of adapters, once requested. */
   readonly #names = new Map<GraphicsBackendName, Promise<string | null>>();
-  /** Set while WebGPU leaves a request unanswered: no photograph waits for it again. */
+  /** Set while WebGPU leaves a request unanswered: no photograph with another backend waits for it again. */
   #silence: PhotoError | null = null;
   readonly #losses = new Map<GraphicsBackendName, { count: number; lastMs: number }>();
 
   constructor(
     private readonly ports: GraphicsPorts = BROWSER_GRAPHICS,
     private readonly maxAnswerMs = MAX_ANSWER_MS,
+    private readonly maxLastAnswerMs = MAX_LAST_ANSWER_MS,
   ) {}
 
-  /** `software` allows a software renderer; `onLost` is called at most once. Rejects with `backend-unavailable`. */
+  /** `onLost` is called at most once. Rejects with `backend-unavailable`. */
   async lease(
     load: LoadGraphics,
     backend: GraphicsBackendName,
-    software: boolean,
+    { backends, software }: DevicePreferences,
     onLost: (reason: string) => void,
   ): Promise<DeviceLease> {
-    if (backend === 'webgpu' && this.#silence) throw this.#silence;
+    const isLast = backends.at(-1) === backend;
+    if (backend === 'webgpu' && this.#silence && !isLast) throw this.#silence;
     this.#checkLosses(backend);
-    const name = await this.#nameOf(backend);
+    const ms = isLast ? this.maxLastAnswerMs : this.maxAnswerMs;
+    const name = await this.#untilAnswered(this.#nameOf(backend), ms);
     if (name === null) throw unavailable('this browser has no device for it');
     if (!software && SOFTWARE_RENDERERS.test(name)) {
       throw unavailable(`its device is a software renderer (${name}), and the CPU is faster`);
     }
+    // Before the time limit: a slow download is no silent browser.
+    await load(backend);
     const device = this.#devices.get(backend) ?? this.#open(load, backend);
     // A new function for each lease, since a caller may pass the same one twice.
     const holder = (reason: string): void => onLost(reason);
@@ -75,7 +85,7 @@ export class Devices {
     };
     try {
       const fail = (reason: string): void => this.#lose(backend, device, reason);
-      return { graphics: await device.graphics, fail, release };
+      return { graphics: await this.#untilAnswered(device.graphics, ms), fail, release };
     } catch (thrown) {
       release();
       throw thrown;
@@ -105,7 +115,7 @@ export class Devices {
   #nameOf(backend: GraphicsBackendName): Promise<string | null> {
     const known = this.#names.get(backend);
     if (known) return known;
-    const name = this.#untilAnswered(this.ports.nameOf(backend), () => {});
+    const name = this.ports.nameOf(backend);
     this.#names.set(backend, name);
     // A device that is missing now may come back, with a restarted driver.
     const forget = () => this.#names.delete(backend);
@@ -115,19 +125,18 @@ export class Devices {
 
   async #openWebGpu(load: LoadGraphics): Promise<GraphicsDevice> {
     const { GraphicsDevice } = await load('webgpu');
-    return await this.#untilAnswered(GraphicsDevice.webgpu(), (device) => device.free());
+    return await GraphicsDevice.webgpu();
   }
 
-  /** Waits for an answer of WebGPU; `onLate` gets one that comes after the time limit. */
-  #untilAnswered<T>(answer: Promise<T>, onLate: (answer: T) => void): Promise<T> {
-    const ms = this.maxAnswerMs;
+  /** Waits for an answer of WebGPU. */
+  #untilAnswered<T>(answer: Promise<T>, ms: number): Promise<T> {
     const onTimeout = () => {
       this.#silence = unavailable(`it does not answer within ${ms / 1000} seconds`);
       // The page may have slept, for example. A refusal is an answer too.
       const answered = () => {
         this.#silence = null;
       };
-      answer.then(onLate, () => {}).then(answered);
+      answer.then(answered, answered);
       return Promise.reject(this.#silence);
     };
     return withTimeout(answer, { ms, onTimeout });
