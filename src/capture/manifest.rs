@@ -134,7 +134,7 @@ impl CameraResponse {
 pub struct Shot {
     /// 8-bit grey or RGB PNG of the light plane's size.
     pub pattern: String,
-    /// 16-bit linear RGB PNG or TIFF of the camera's size.
+    /// Linear RGB PNG or TIFF of the camera's size, with 16-bit integers or, in a TIFF, floating-point numbers.
     pub photo: String,
     /// Exposure relative to a shot without this field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -144,7 +144,7 @@ pub struct Shot {
 /// A photograph of one bit of the Gray code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GrayCodeShot {
-    /// 16-bit linear RGB PNG or TIFF.
+    /// Linear RGB PNG or TIFF, likewise.
     pub photo: String,
     /// `x` or `y`.
     pub axis: LightPlaneAxis,
