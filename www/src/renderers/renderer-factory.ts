@@ -39,7 +39,7 @@ export function rendererFactory({
   const warmUp = async (backend: Backend, preferences: BackendPreferences, signal: AbortSignal) => {
     if (backend !== 'cpu') {
       const renderers = await gpu();
-      return signal.aborted ? () => {} : await renderers.warmUp(backend, preferences);
+      return signal.aborted ? () => {} : await renderers.warmUp(backend, preferences, signal);
     }
     // Workers that start earlier would wait for the module that the page is still fetching.
     const [renderers] = await Promise.all([cpu(), cpuModule()]);

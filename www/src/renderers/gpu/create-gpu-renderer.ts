@@ -17,7 +17,7 @@ export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
       onLost: (reason: string) => void,
       signal: AbortSignal,
     ): Promise<Renderer> {
-      const lease = await devices.lease(load, backend, preferences, onLost);
+      const lease = await devices.lease(load, backend, preferences, onLost, signal);
       try {
         signal.throwIfAborted();
         const module = await load(backend);
@@ -39,8 +39,9 @@ export function gpuRenderers(load: LoadGraphics, devices = new Devices()) {
     async warmUp(
       backend: GraphicsBackendName,
       preferences: DevicePreferences,
+      signal: AbortSignal,
     ): Promise<() => void> {
-      return (await devices.lease(load, backend, preferences, () => {})).release;
+      return (await devices.lease(load, backend, preferences, () => {}, signal)).release;
     },
   };
 }

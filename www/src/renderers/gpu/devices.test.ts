@@ -239,7 +239,45 @@ test('a browser that does not give a name has no device', async () => {
   });
 });
 
-test('a browser that answers late is asked again', async () => {
+test('a lease that is cancelled ends at once, and the next uses its request', async () => {
+  const f = fakeDevices();
+  const open = f.openLate();
+  const abort = new AbortController();
+  const only = { backends: ['webgpu'] as const, software: true };
+  const cancelled = f.devices.lease(f.load, 'webgpu', only, f.onLost('a'), abort.signal);
+  await settle();
+  abort.abort(new Error('cancelled'));
+  await assert.rejects(cancelled, /cancelled/);
+  const next = f.devices.lease(f.load, 'webgpu', only, f.onLost('b'));
+  await settle();
+  open();
+  assert.equal((await next).graphics.kernel, 'webgpu 0');
+  await settle();
+  assert.deepEqual(f.takeLog(), [], 'the device is in use');
+});
+
+test('a device that opens late is waited for where no other backend is left', async () => {
+  const f = fakeDevices();
+  const open = f.openLate();
+  const only = { backends: ['webgpu'] as const, software: true };
+  const patient = f.devices.lease(f.load, 'webgpu', only, f.onLost('a'));
+  await assert.rejects(
+    f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('b')),
+    /does not answer within/,
+  );
+  f.pass(20);
+  // Another that has waited long enough fails at once.
+  await assert.rejects(
+    f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('c')),
+    /does not answer within/,
+  );
+  open();
+  assert.equal((await patient).graphics.kernel, 'webgpu 0');
+  const after = await f.devices.lease(f.load, 'webgpu', SOFTWARE, f.onLost('d'));
+  assert.equal(after.graphics, (await patient).graphics);
+});
+
+test('an answer that comes late is used', async () => {
   const f = fakeDevices();
   let answer = (_: string): void => {};
   const names = [
@@ -273,6 +311,7 @@ test('a browser that answers late is waited for where no other backend is left',
   const alsoPatient = lease({ backends: ['webgpu'], software: true });
   name.resolve('A real device');
   assert.equal((await patient).graphics, (await alsoPatient).graphics);
+  assert.ok(await lease(SOFTWARE), 'the late answer is known');
   const silent = { ...ports, nameOf: () => new Promise<never>(() => {}) };
   const impatient = new Devices(silent, 20, 30);
   await assert.rejects(

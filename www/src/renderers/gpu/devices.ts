@@ -25,9 +25,15 @@ export interface DeviceLease {
   release(): void;
 }
 
+/** A question to the browser. */
+interface Request<T> {
+  readonly answer: Promise<T>;
+  readonly askedMs: number;
+}
+
 /** A device that is open or being opened. */
 interface SharedDevice {
-  readonly graphics: Promise<GraphicsDevice>;
+  readonly graphics: Request<GraphicsDevice>;
   readonly holders: Set<(reason: string) => void>;
   /** Lost or freed: later events of the device are ignored. */
   isClosed: boolean;
@@ -38,7 +44,7 @@ const MAX_LOSSES = 3;
 const LOSS_MEMORY_MS = 60_000;
 /** Some browsers never answer a request for WebGPU. Then the next backend is tried. */
 const MAX_ANSWER_MS = 10_000;
-/** Waiting costs nothing while no other backend is left, and a software renderer on a busy machine is slow to open. */
+/** The limit where no other backend is left: a software renderer on a busy machine is slow to open. */
 const MAX_LAST_ANSWER_MS = 60_000;
 
 const SOFTWARE_RENDERERS = /swiftshader|llvmpipe|lavapipe|softpipe|basic render|software/i;
@@ -46,9 +52,7 @@ const SOFTWARE_RENDERERS = /swiftshader|llvmpipe|lavapipe|softpipe|basic render|
 export class Devices {
   readonly #devices = new Map<GraphicsBackendName, SharedDevice>();
   /** The names of adapters, once requested. */
-  readonly #names = new Map<GraphicsBackendName, Promise<string | null>>();
-  /** Set while WebGPU leaves a request unanswered: no photograph with another backend waits for it again. */
-  #silence: PhotoError | null = null;
+  readonly #names = new Map<GraphicsBackendName, Request<string | null>>();
   readonly #losses = new Map<GraphicsBackendName, { count: number; lastMs: number }>();
 
   constructor(
@@ -57,23 +61,26 @@ export class Devices {
     private readonly maxLastAnswerMs = MAX_LAST_ANSWER_MS,
   ) {}
 
-  /** `onLost` is called at most once. Rejects with `backend-unavailable`. */
+  /**
+   * `onLost` is called at most once. Rejects with `backend-unavailable`, and with the reason of `signal`. A request that the
+   * browser leaves unanswered is not repeated: the next lease waits as long as is left of its limit.
+   */
   async lease(
     load: LoadGraphics,
     backend: GraphicsBackendName,
     { backends, software }: DevicePreferences,
     onLost: (reason: string) => void,
+    signal?: AbortSignal,
   ): Promise<DeviceLease> {
-    const isLast = backends.at(-1) === backend;
-    if (backend === 'webgpu' && this.#silence && !isLast) throw this.#silence;
     this.#checkLosses(backend);
-    const ms = isLast ? this.maxLastAnswerMs : this.maxAnswerMs;
-    const name = await this.#untilAnswered(this.#nameOf(backend), ms);
+    const isLast = backends.at(-1) === backend;
+    const maxMs = isLast ? this.maxLastAnswerMs : this.maxAnswerMs;
+    const name = await this.#untilAnswered(this.#nameOf(backend), maxMs, signal);
     if (name === null) throw unavailable('this browser has no device for it');
     if (!software && SOFTWARE_RENDERERS.test(name)) {
       throw unavailable(`its device is a software renderer (${name}), and the CPU is faster`);
     }
-    // Before the time limit: a slow download is no silent browser.
+    // The time limit is for the browser's answer, not for the download.
     await load(backend);
     const device = this.#devices.get(backend) ?? this.#open(load, backend);
     // A new function for each lease, since a caller may pass the same one twice.
@@ -85,9 +92,15 @@ export class Devices {
     };
     try {
       const fail = (reason: string): void => this.#lose(backend, device, reason);
-      return { graphics: await this.#untilAnswered(device.graphics, ms), fail, release };
+      const graphics = await this.#untilAnswered(device.graphics, maxMs, signal);
+      return { graphics, fail, release };
     } catch (thrown) {
-      release();
+      device.holders.delete(holder);
+      // It may be open by then in use by others.
+      const closeUnused = (): void => {
+        if (device.holders.size === 0) this.#close(backend, device);
+      };
+      device.graphics.answer.then(closeUnused, closeUnused);
       throw thrown;
     }
   }
@@ -102,24 +115,26 @@ export class Devices {
 
   #open(load: LoadGraphics, backend: GraphicsBackendName): SharedDevice {
     const lose = (reason: string): void => this.#lose(backend, device, reason);
-    const graphics = backend === 'webgpu' ? this.#openWebGpu(load) : this.#openWebGl2(load, lose);
+    const answer = backend === 'webgpu' ? this.#openWebGpu(load) : this.#openWebGl2(load, lose);
+    const graphics = { answer, askedMs: this.ports.now() };
     const device: SharedDevice = { graphics, holders: new Set(), isClosed: false };
     this.#devices.set(backend, device);
-    graphics.then(
+    answer.then(
       ({ lost }) => lost?.then(({ message }) => lose(message || 'the graphics device is gone.')),
       () => {}, // `lease` rejects with it
     );
     return device;
   }
 
-  #nameOf(backend: GraphicsBackendName): Promise<string | null> {
+  #nameOf(backend: GraphicsBackendName): Request<string | null> {
     const known = this.#names.get(backend);
     if (known) return known;
-    const name = this.ports.nameOf(backend);
+    const answer = this.ports.nameOf(backend);
+    const name = { answer, askedMs: this.ports.now() };
     this.#names.set(backend, name);
     // A device that is missing now may come back, with a restarted driver.
     const forget = () => this.#names.delete(backend);
-    name.then((found) => found ?? forget(), forget);
+    answer.then((found) => found ?? forget(), forget);
     return name;
   }
 
@@ -128,18 +143,16 @@ export class Devices {
     return await GraphicsDevice.webgpu();
   }
 
-  /** Waits for an answer of WebGPU. */
-  #untilAnswered<T>(answer: Promise<T>, ms: number): Promise<T> {
-    const onTimeout = () => {
-      this.#silence = unavailable(`it does not answer within ${ms / 1000} seconds`);
-      // The page may have slept, for example. A refusal is an answer too.
-      const answered = () => {
-        this.#silence = null;
-      };
-      answer.then(answered, answered);
-      return Promise.reject(this.#silence);
-    };
-    return withTimeout(answer, { ms, onTimeout });
+  /** Waits for an answer until `maxMs` after the question. */
+  #untilAnswered<T>(
+    { answer, askedMs }: Request<T>,
+    maxMs: number,
+    signal?: AbortSignal,
+  ): Promise<T> {
+    const ms = Math.max(0, askedMs + maxMs - this.ports.now());
+    const onTimeout = () =>
+      Promise.reject(unavailable(`it does not answer within ${maxMs / 1000} seconds`));
+    return withTimeout(answer, { ...(signal && { signal }), ms, onTimeout });
   }
 
   async #openWebGl2(load: LoadGraphics, lose: (reason: string) => void): Promise<GraphicsDevice> {
@@ -167,7 +180,7 @@ export class Devices {
     if (device.isClosed) return;
     device.isClosed = true;
     if (this.#devices.get(backend) === device) this.#devices.delete(backend);
-    device.graphics.then(
+    device.graphics.answer.then(
       (graphics) => graphics.free(),
       () => {},
     );
