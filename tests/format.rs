@@ -945,6 +945,41 @@ fn a_crafted_file_is_refused_with_its_fault() {
         ),
         "{error}"
     );
+    let sides = |camera: [u32; 2], light: [u32; 2]| {
+        let sides = [camera, light, [9, 8]];
+        let edit = |f: &mut Vec<u8>| {
+            for (i, side) in sides.as_flattened().iter().enumerate() {
+                f[16 + 4 * i..][..4].copy_from_slice(&side.to_le_bytes());
+            }
+        };
+        decode(&sealed(file.clone(), edit), 1 << 20).unwrap_err()
+    };
+    let error = sides([(1 << 20) + 1, 1], [1, 1]);
+    assert!(
+        error.to_string().contains("camera width is 1048577"),
+        "{error}"
+    );
+    for (camera, light) in [
+        ([1 << 20, (1 << 16) + 1], [1, 1]),
+        ([1, 1], [1 << 20, (1 << 16) + 1]),
+    ] {
+        let error = sides(camera, light);
+        assert!(matches!(error, FormatError::InvalidGeometry(_)), "{error}");
+    }
+    let error = sides([1 << 20, 1 << 16], [1, 1]);
+    assert!(
+        matches!(
+            error,
+            FormatError::TooMany {
+                quantity: "tiles",
+                ..
+            }
+        ),
+        "{error}"
+    );
+    // A file of a few kilobytes has a long light plane: a program must not allocate its border.
+    let error = sides([8, 8], [1 << 20, 1]);
+    assert!(matches!(error, FormatError::Limit { .. }), "{error}");
     let error = header(field::RANK, 3);
     assert!(matches!(error, FormatError::InvalidScan { .. }), "{error}");
     let error = header(field::SCANS, 5000);

@@ -18,7 +18,9 @@ import zstandard
 f32 = np.float32
 
 # Appendix A.
-MAX_SIDE = 32768
+MAX_SIDE = 1 << 20
+MAX_AREA = 1 << 36
+MAX_TILES = 1 << 24
 MAX_WINDOW = 63
 TILE_SIDES = 8, 256
 MAX_RANK = MAX_SCANS = 1024
@@ -29,7 +31,6 @@ MAX_CONTENT_BYTES = MAX_WINDOW_BYTES = 1 << 23
 MAX_EXPONENT = 30
 SPACINGS = 8, 4096
 MAX_CONTROL_POINTS = 1 << 20
-MAX_LEVEL_SIDE = 1 << 20
 MAX_LEVELS = 14
 SHARD_SIDES = 256, 4096
 
@@ -115,7 +116,11 @@ class FileIndex:
         require(fields[2] <= MAX_EXTENSION_BYTES, "the length of extensions")
         require(fields[4] <= MAX_METADATA_BYTES, "the length of the metadata")
         require(144 + sum(fields[::2]) <= file_bytes == len(file), "the length of the file")
+        areas = self.width * self.height, self.light_width * self.light_height
+        require(max(areas) <= MAX_AREA, "the number of pixels or light elements")
         side = self.tile_side
+        tiles = -(-self.width // side) * -(-self.height // side)
+        require(tiles <= MAX_TILES, "the number of tiles")
         self.corners = [
             (x, y) for y in range(0, self.height, side) for x in range(0, self.width, side)
         ]
@@ -229,7 +234,9 @@ def split_levels(file):  # section 12
         return [(root, file)]
     require(len(root.table) >= 24, "a table of levels that is cut short")
     *sides, levels, shard_side = unpack_from("<6I", root.table)
-    require(all(1 <= side <= MAX_LEVEL_SIDE for side in sides), "a side of level 0")
+    require(all(1 <= side <= MAX_SIDE for side in sides), "a side of level 0")
+    require(sides[0] * sides[1] <= MAX_AREA, "the number of pixels of level 0")
+    require(sides[2] * sides[3] <= MAX_AREA, "the number of light elements of level 0")
     require(2 <= levels <= MAX_LEVELS, "the number of levels")
     is_shard_side = SHARD_SIDES[0] <= shard_side <= SHARD_SIDES[1]
     require(is_shard_side and shard_side & (shard_side - 1) == 0, "the side of shards")

@@ -51,9 +51,11 @@ def constants():
     side, content = decoder.MAX_SIDE, decoder.MAX_CONTENT_BYTES
     low, high = decoder.TILE_SIDES
     yield [
-        f"| camera width and height, light width and height | 1 to {side} |",
+        f"| camera width and height, light width and height | 1 to {power_of_two(side)} |",
+        f"| camera width · height, light width · height | {power_of_two(decoder.MAX_AREA)} |",
         f"| window side | 1 to {decoder.MAX_WINDOW}, odd |",
         f"| tile side | {low} to {high} |",
+        f"| tiles | {power_of_two(decoder.MAX_TILES)} |",
         f"| rank | {decoder.MAX_RANK} |",
         f"| scans | {decoder.MAX_SCANS} |",
         f"| extensions | {power_of_two(decoder.MAX_EXTENSION_BYTES)} bytes |",

@@ -92,7 +92,7 @@ impl DisplayedPicture {
         let element = |(u, v): (u32, u32)| {
             let columns = u * side..((u + 1) * side).min(self.extent.width);
             let rows = v * side..((v + 1) * side).min(self.extent.height);
-            let count = f64::from(columns.len() as u32 * rows.len() as u32);
+            let count = columns.len() as f64 * rows.len() as f64;
             let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
             let mut sum = [0.0; CHANNELS];
             let (mut least, mut most) = ([f64::INFINITY; CHANNELS], [0.0f64; CHANNELS]);

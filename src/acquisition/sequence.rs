@@ -11,7 +11,7 @@ use crate::capture::{GrayCodeShot, Manifest, ManifestCamera, ManifestLight, Shot
 use crate::simulate::{
     GrayCodePattern, MONITOR_GAMMA, PatternEnsemble, PatternImage, RandomStreamId,
 };
-use crate::transport::{CHANNELS, Extent, MAX_SIDE};
+use crate::transport::{CHANNELS, Extent, MAX_AREA, MAX_SIDE};
 
 /// File name of a sequence.
 pub const SEQUENCE_NAME: &str = "sequence.json";
@@ -168,6 +168,9 @@ pub enum SequenceError {
     /// A side of the display or the light plane is zero or too large.
     #[error("\"layout\" has a side that is not between 1 and {MAX_SIDE}")]
     Side,
+    /// The display or the light plane is too large.
+    #[error("\"layout\" has more than {MAX_AREA} display pixels or light elements")]
+    Area,
     /// A bit of the Gray code is none of the light plane's.
     #[error(
         "pictures[{index}]: \"bit\" is {bit}, but {light} light elements have no such bit of axis {axis}"
@@ -302,6 +305,9 @@ impl PatternSequence {
         let sides = [display.width, display.height, light.width, light.height];
         if !sides.iter().all(|side| (1..=MAX_SIDE).contains(side)) {
             return Err(SequenceError::Side);
+        }
+        if display.is_too_large() || light.is_too_large() {
+            return Err(SequenceError::Area);
         }
         DisplayLayout::new(display, light, Some(element_side))?;
         Ok(())

@@ -182,7 +182,8 @@ type DecodedAxis = (Vec<GrayCodePosition>, [f64; 3]);
 
 /// Positions along one axis of the pixels with at least half of their bits clear.
 pub(super) fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<GrayCodePosition> {
-    let pixels = rows.len() * width as usize;
+    let width = width as usize;
+    let pixels = rows.len() * width;
     // A saturated sample is at least white, which is 1.
     let value = |v: &f32| if v.is_nan() { 1.0 } else { *v };
     let sum = |p: &[f32; CHANNELS]| p.iter().map(value).sum::<f32>();
@@ -209,7 +210,7 @@ pub(super) fn decode(bits: &[BitPair], rows: &[u32], width: u32) -> Vec<GrayCode
         let unclear = bits.len() - clear;
         (2 * clear >= bits.len() && clear > 0).then(|| {
             let range = f64::from(1u32 << unclear.min(31));
-            let (x, y) = (n as u32 % width, rows[n / width as usize]);
+            let (x, y) = ((n % width) as u32, rows[n / width]);
             GrayCodePosition {
                 pixel: CameraPixel { x, y },
                 position: (f64::from(code) + 0.5) * range,

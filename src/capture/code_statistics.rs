@@ -9,9 +9,10 @@ use crate::transport::CHANNELS;
 /// times those with the next lower code, are saturated.
 const MIN_PILE: usize = 6;
 const MIN_PILE_RATIO: usize = 8;
-/// Pixels of a row that are summarised side by side. A row of [`MAX_SIDE`](crate::transport::MAX_SIDE) pixels has fewer times
-/// as many than a lane can count.
+/// Pixels of a row that are summarised side by side.
 const SUMMARY_PIXELS: usize = 16;
+/// Pixels of a row that are summarised at a time: fewer times [`SUMMARY_PIXELS`] than a lane can count.
+const MAX_SUMMARY: usize = SUMMARY_PIXELS * (u16::MAX as usize - 1);
 /// 8-bit codes are scaled to 16 bits by one of these factors.
 const EIGHT_BIT_FACTORS: [u16; 2] = [257, 256];
 
@@ -54,6 +55,12 @@ impl CodeStatistics {
             let mut codes = row.as_flattened().iter();
             *are_multiples = *are_multiples && codes.all(|code| code.is_multiple_of(factor));
         }
+        for part in row.chunks(MAX_SUMMARY) {
+            self.add_part(part, saturated_from);
+        }
+    }
+
+    fn add_part(&mut self, row: &[[u16; CHANNELS]], saturated_from: [u32; CHANNELS]) {
         let RowSummary { highest, saturated } = vectorise(
             #[cfg_attr(target_arch = "x86_64", inline(always))]
             || RowSummary::new(row, saturated_from),
@@ -135,7 +142,7 @@ impl CodeStatistics {
     }
 }
 
-/// The highest code of each channel in a row that is not saturated, and the number of saturated samples.
+/// The highest code of each channel in a part of a row that is not saturated, and the number of saturated samples.
 struct RowSummary {
     highest: [u16; CHANNELS],
     saturated: usize,
@@ -189,6 +196,7 @@ fn count([first, second]: &mut [(u16, usize); 2], code: u16, samples: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transport::MAX_SIDE;
 
     fn statistics(codes: impl IntoIterator<Item = u16>, white: u16) -> CodeStatistics {
         let mut statistics = CodeStatistics::of_photograph();
@@ -202,6 +210,14 @@ mod tests {
     /// Codes of a photograph: many values, none of them often.
     fn codes(count: u32) -> impl Iterator<Item = u16> {
         (0..count).map(|i| (600 + i.wrapping_mul(2_654_435_761) % 40_000) as u16)
+    }
+
+    #[test]
+    fn saturated_samples_of_the_longest_row_are_counted() {
+        let row = vec![[60_000; CHANNELS]; MAX_SIDE as usize];
+        let mut statistics = CodeStatistics::of_photograph();
+        statistics.add_row(&row, [50_000; CHANNELS]);
+        assert_eq!(statistics.saturated, CHANNELS * row.len());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::transport::Extent;
 
 /// Formats of photographs; pages read PNG only.
 #[cfg(not(target_arch = "wasm32"))]
-const PHOTO_FORMATS: &str = "PNG or TIFF, or a TIFF of 16- or 32-bit floating-point numbers";
+const PHOTO_FORMATS: &str = "PNG or TIFF, or a linear RGB TIFF of floating-point numbers";
 #[cfg(target_arch = "wasm32")]
 const PHOTO_FORMATS: &str = "PNG";
 

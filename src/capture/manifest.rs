@@ -7,14 +7,16 @@ use serde::{Deserialize, Serialize};
 use super::error::{CaptureError, CaptureErrorKind};
 use super::measurements::Pattern;
 use crate::calibrate::LightPlaneAxis;
-use crate::transport::{CHANNELS, ColorMatrix, Correspondence, Extent, MAX_COLOR_FACTOR, MAX_SIDE};
+use crate::transport::{
+    CHANNELS, ColorMatrix, Correspondence, Extent, MAX_AREA, MAX_COLOR_FACTOR, MAX_SIDE,
+};
 
 /// Largest 16-bit code.
 const MAX_CODE: f64 = 65535.0;
 /// Largest share by which a display may dim.
 const MAX_DIMMING: f64 = 0.9;
-/// Bits 0 to 15 number the elements of the largest light plane.
-const MAX_GRAY_CODE_BIT: u32 = 15;
+/// Bits 0 to 19 number the elements of the largest light plane.
+const MAX_GRAY_CODE_BIT: u32 = MAX_SIDE.ilog2() - 1;
 
 /// The manifest, version 1. Paths are relative to its folder. Unknown fields are ignored.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -144,7 +146,7 @@ pub struct Shot {
 /// A photograph of one bit of the Gray code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GrayCodeShot {
-    /// Linear RGB PNG or TIFF, likewise.
+    /// Linear RGB PNG or TIFF, with integers or floating-point numbers as above.
     pub photo: String,
     /// `x` or `y`.
     pub axis: LightPlaneAxis,
@@ -337,6 +339,10 @@ impl Manifest {
             let allowed = format!("between 1 and {MAX_SIDE}");
             let valid = (1..=MAX_SIDE).contains(&side);
             check(check_range(valid, field, side, &allowed));
+        }
+        for (field, grid) in [("light", light.extent()), ("camera", camera.extent())] {
+            let allowed = format!("of at most {MAX_AREA} cells");
+            check(check_range(!grid.is_too_large(), field, grid, &allowed));
         }
         let (black, white) = (camera.black, camera.white);
         let valid = (0.0..MAX_CODE).contains(&black);

@@ -53,16 +53,16 @@ struct NoiseEstimationPatch {
 
 /// The squares of the picture that the gain is estimated from: at most [`MAX_BLOCKS`], spread evenly.
 pub(crate) fn sample_squares(camera: Extent) -> impl Iterator<Item = TileRect> {
-    let columns = camera.width / BLOCK_SIDE;
-    let count = columns as usize * (camera.height / BLOCK_SIDE) as usize;
+    let columns = (camera.width / BLOCK_SIDE) as usize;
+    let count = columns * (camera.height / BLOCK_SIDE) as usize;
     let stride = count.div_ceil(MAX_BLOCKS).max(1);
     (0..count).step_by(stride).map(move |i| {
-        let row = i as u32 / columns;
+        let row = i / columns;
         // Shifted from row to row, so that the blocks do not line up in columns.
-        let column = (i as u32 % columns + row * 7) % columns;
+        let column = (i % columns + row * 7) % columns;
         TileRect {
-            x: column * BLOCK_SIDE,
-            y: row * BLOCK_SIDE,
+            x: column as u32 * BLOCK_SIDE,
+            y: row as u32 * BLOCK_SIDE,
             extent: Extent::new(BLOCK_SIDE, BLOCK_SIDE),
         }
     })

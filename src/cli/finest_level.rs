@@ -126,7 +126,9 @@ impl FinestLevel {
 
     /// The whole picture under a light, in linear light.
     pub fn picture(&mut self, light: &Light) -> Result<Vec<[f32; CHANNELS]>> {
-        let mut picture = Vec::with_capacity(self.geometry.camera.area());
+        let (mut picture, camera) = (Vec::new(), self.geometry.camera);
+        let reserved = picture.try_reserve_exact(camera.area());
+        reserved.with_context(|| format!("there is no memory for a picture of {camera} pixels"))?;
         self.relight(light, |_, pixels| {
             picture.extend_from_slice(pixels);
             Ok(())

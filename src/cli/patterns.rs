@@ -17,11 +17,11 @@ use crate::acquisition::{
     SessionSetup,
 };
 use crate::simulate::{PatternEnsemble, PatternImage};
-use crate::transport::Extent;
+use crate::transport::{Extent, MAX_SIDE};
 
 const DISPLAY_SIDES: RangeInclusive<u32> = 16..=16_384;
 const LIGHT_SIDES: RangeInclusive<u32> = 4..=2048;
-const CAMERA_SIDES: RangeInclusive<u32> = 8..=32_768;
+const CAMERA_SIDES: RangeInclusive<u32> = 8..=MAX_SIDE;
 /// The pattern player.
 const PLAYER_NAME: &str = "player.html";
 /// File names have four digits.

@@ -33,6 +33,8 @@ const ENCODED_VALUE_BYTES: u64 = 60;
 const RATE_CONTROL_BYTES: u64 = 64 << 20;
 /// Pixels of the Gray code photographs that are decoded: several for each control point of a displacement.
 const MAX_GRAY_CODE_PIXELS: usize = 1 << 20;
+/// Rows that are decoded at least, so that the correspondence is known along columns.
+const MIN_GRAY_CODE_ROWS: usize = 16;
 /// The decoded position of a camera pixel.
 const POSITION_BYTES: u64 = 64;
 
@@ -55,6 +57,8 @@ pub struct CaptureSize {
     pub light: Extent,
     /// Number of photographs to recover from.
     pub shots: usize,
+    /// Number of planes of their patterns: one of a grey pattern, three of a coloured one.
+    pub pattern_planes: usize,
     /// Number of Gray code photographs to decode.
     pub gray_code: usize,
 }
@@ -158,6 +162,7 @@ impl MemoryPlan {
             camera,
             light,
             shots,
+            pattern_planes,
             gray_code,
         } = size;
         let max_window = window.unwrap_or(WindowSizeEstimate::MAX_WINDOW);
@@ -167,7 +172,7 @@ impl MemoryPlan {
             + method
                 .preparation_bytes(max_window, shots)
                 .max(PreparedRecovery::sample_bytes(max_window)) as u64
-            + PIXEL_BYTES * (shots * light.area()) as u64 // patterns, of any colour
+            + (size_of::<f32>() * pattern_planes * light.area()) as u64
             + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width);
         // The functions of a tile as real numbers, as codes, and as byte planes to compress.
         let element = PIXEL_BYTES + 8 + 2 * CHANNELS as u64;
@@ -292,9 +297,9 @@ fn encoding_bytes(camera: Extent, window: Window, rank: usize) -> (u64, u64) {
 }
 
 /// The camera rows of Gray code photographs to decode: all of at most [`MAX_GRAY_CODE_PIXELS`], otherwise so many, evenly
-/// spaced.
+/// spaced, and at least [`MIN_GRAY_CODE_ROWS`].
 fn gray_code_rows(camera: Extent) -> CameraRowSet {
-    let max_rows = (MAX_GRAY_CODE_PIXELS / camera.width as usize).max(1);
+    let max_rows = (MAX_GRAY_CODE_PIXELS / camera.width as usize).max(MIN_GRAY_CODE_ROWS);
     let interval = (camera.height as usize).div_ceil(max_rows);
     let rows = (0..camera.height).step_by(interval);
     CameraRowSet::from_strips(rows.map(|y| y..y + 1))
@@ -312,6 +317,7 @@ mod tests {
             camera,
             light: Extent::new(64, 64),
             shots: 80,
+            pattern_planes: 80,
             gray_code: 24,
         };
         let window = Window::new(9).ok();
@@ -376,7 +382,12 @@ mod tests {
 
     #[test]
     fn gray_code_is_decoded_in_rows_over_the_whole_picture() {
-        for (camera, expected) in [([500, 300], 300), ([1024, 1024], 1024), ([4096, 3000], 250)] {
+        for (camera, expected) in [
+            ([500, 300], 300),
+            ([1024, 1024], 1024),
+            ([4096, 3000], 250),
+            ([1 << 18, 3200], 16),
+        ] {
             let camera = Extent::new(camera[0], camera[1]);
             let rows = gray_code_rows(camera);
             assert_eq!(rows.count(), expected);
@@ -389,12 +400,29 @@ mod tests {
     }
 
     #[test]
+    fn coloured_patterns_take_three_times_as_much_as_grey_ones() {
+        let min = |pattern_planes: usize| {
+            let size = CaptureSize {
+                camera: Extent::new(4000, 4000),
+                light: Extent::new(1000, 1000),
+                shots: 80,
+                pattern_planes,
+                gray_code: 0,
+            };
+            let plan = MemoryPlan::new(0, size, Method::Nnls, Window::new(9).ok(), 2);
+            plan.unwrap_err().min
+        };
+        assert_eq!(min(240) - min(80), 160 * 4_000_000);
+    }
+
+    #[test]
     fn tiles_alone_take_less_memory_than_a_recovery() {
         let window = Window::new(9).unwrap();
         let size = CaptureSize {
             camera: Extent::new(4000, 4000),
             light: Extent::new(64, 64),
             shots: 80,
+            pattern_planes: 80,
             gray_code: 24,
         };
         let method = Method::Learned;

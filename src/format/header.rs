@@ -2,11 +2,12 @@
 
 use super::checksum::{check_crc, checksum};
 use super::constants::{
-    HEADER_BYTES, MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS,
+    HEADER_BYTES, MAX_CELLS, MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS,
 };
 use super::error::{FormatError, SectionName, TextModeDamage};
 use super::fields::FieldReader;
-use crate::transport::{Correspondence, Geometry};
+use super::memory_estimate;
+use crate::transport::{Correspondence, Geometry, GeometryError};
 
 /// Version of written files. A reader accepts other minor versions and refuses other major ones.
 const MAJOR: u16 = 1;
@@ -120,9 +121,15 @@ impl Header {
             extensions: section(),
             metadata: section(),
         };
+        header.geometry.check_area().map_err(invalid_geometry)?;
+        // At most 2^30: a tile has 8 x 8 pixels or lies at a border. Pictures of WebAssembly never have too many.
+        #[cfg(not(target_arch = "wasm32"))]
+        let tiles = header.geometry.tile_grid().area() as u32;
         let (extensions, metadata) = (header.extensions.bytes, header.metadata.bytes);
         for (quantity, value, limit) in [
             ("basis functions", rank, MAX_RANK.into()),
+            #[cfg(not(target_arch = "wasm32"))]
+            ("tiles", tiles, super::constants::MAX_TILES),
             ("scans", scans, MAX_SCANS),
             ("bytes of extensions", extensions, MAX_EXTENSION_BYTES),
             ("bytes of metadata", metadata, MAX_METADATA_BYTES),
@@ -143,6 +150,17 @@ impl Header {
             }),
             false => Ok(header),
         }
+    }
+}
+
+/// A valid picture may be larger than a program with 32-bit addresses can hold.
+fn invalid_geometry(error: GeometryError) -> FormatError {
+    match error {
+        GeometryError::Area(cells) if cells <= MAX_CELLS => FormatError::Limit {
+            need: memory_estimate::RELIT_CELL_BYTES * cells,
+            limit: usize::MAX as u64,
+        },
+        error => FormatError::InvalidGeometry(error),
     }
 }
 

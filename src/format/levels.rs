@@ -19,18 +19,17 @@
 
 use std::ops::Range;
 
+use super::constants::MAX_CELLS;
 use super::error::{FormatError, SectionError, SectionName, damaged};
 use super::extension::{FormatExtension, TABLE_TAG};
 use super::fields::FieldReader;
 use super::index::FileIndex;
-use crate::transport::{Extent, ShardOrigin, TileRect};
+use crate::transport::{Extent, MAX_SIDE, ShardOrigin, TileRect};
 
 /// The name of the extension with the place of a shard.
 pub(super) const PLACE_TAG: [u8; 4] = *b"SHRD";
 /// Bytes of the table before the lengths.
 const FIXED_BYTES: usize = 24;
-/// Maximum side of level 0, in pixels or light elements.
-const MAX_SIDE: u32 = 1 << 20;
 /// Range of the sides of shards, which are powers of two.
 const SHARD_SIDES: Range<u32> = 256..4097;
 /// Maximum number of levels: those of the largest picture and the smallest shards, and one more.
@@ -254,6 +253,7 @@ impl Grids {
     ) -> Result<Self, SectionError> {
         let sides = [camera.width, camera.height, light.width, light.height];
         let is_valid = sides.iter().all(|side| (1..=MAX_SIDE).contains(side))
+            && camera.area_u64().max(light.area_u64()) <= MAX_CELLS
             && (2..=MAX_LEVELS).contains(&levels)
             && SHARD_SIDES.contains(&shard_side)
             && shard_side.is_power_of_two();
@@ -270,7 +270,7 @@ impl Grids {
         if grids.shard_grid(levels - 1).area() != 1 {
             return Err(damaged("the last level has more than one shard"));
         }
-        // At most 4/3 of 2^24 shards.
+        // At most 4/3 of 2^20 shards, and a few more of long pictures.
         grids.shards = (0..levels - 1)
             .map(|level| grids.shard_grid(level).area())
             .sum();
@@ -488,7 +488,9 @@ mod tests {
             refused(&|data| data[at..at + 4].copy_from_slice(&u32::to_le_bytes(value)));
         }
         // The most shards that a table can claim take no memory.
-        let claim = [MAX_SIDE, MAX_SIDE, 1, 1, 13, 256].map(u32::to_le_bytes);
+        let claim = [MAX_SIDE, 1 << 16, 1, 1, 13, 256].map(u32::to_le_bytes);
         assert!(decode(claim.as_flattened()).is_some());
+        let claim = [MAX_SIDE, (1 << 16) + 1, 1, 1, 13, 256].map(u32::to_le_bytes);
+        assert!(decode(claim.as_flattened()).is_none());
     }
 }

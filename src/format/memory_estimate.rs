@@ -16,6 +16,13 @@ use crate::transport::{CHANNELS, TexelCodes, Tile};
 const STATE_BYTES: u64 = 32;
 const TILE_STATE_BYTES: u64 = 256;
 
+/// Bytes of a cell of the picture or the light.
+pub(super) const RELIT_CELL_BYTES: u64 = size_of::<[f32; 4]>() as u64;
+/// Light elements: the most that the border of a light adds to each row or column. Up to `MAX_FREE_SIDE` elements along a side
+/// the border takes little memory, however narrow the light plane is.
+const MAX_BORDER: u64 = 512;
+const MAX_FREE_SIDE: u32 = 1 << 15;
+
 /// How much of a file is read at a time.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Part {
@@ -31,7 +38,9 @@ pub(super) fn relight_bytes(header: &Header, part: Part) -> u64 {
     }
     let geometry = &header.geometry;
     let elements = geometry.camera.area() as u64 + 2 * geometry.light.area() as u64;
-    elements * size_of::<[f32; 4]>() as u64
+    let longest = geometry.light.width.max(geometry.light.height);
+    let border = u64::from(longest.saturating_sub(MAX_FREE_SIDE)) * MAX_BORDER;
+    (elements + border) * RELIT_CELL_BYTES
 }
 
 /// Bytes that the index takes while it is decoded, with what the reader keeps for it and for relighting.
@@ -70,7 +79,7 @@ pub(super) fn file_bytes(index: &FileIndex, part: Part) -> u64 {
         let mut scans = index.scans.iter().enumerate();
         scans.any(|(i, scan)| !scan.coding.is_direct() && index.entry(i, tile).bytes > 0)
     };
-    // At most 2^30 pixels of 63² elements of 12 bytes: no overflow.
+    // At most 2^36 pixels of 63² elements of 12 bytes: no overflow.
     let (mut kept, mut working) = (0, 0);
     for (i, rect) in geometry.tiles().enumerate() {
         let pixels = rect.extent.area() as u64;

@@ -132,7 +132,7 @@ pub fn shard(geometry: &Geometry, rect: TileRect) -> Geometry {
 /// [`shard`].
 ///
 /// # Errors
-/// [`GeometryError::Displacement`] if the control points do not fit together.
+/// [`GeometryError`] if the control points do not fit together, or the level is too large.
 pub fn whole(
     camera: Extent,
     light: Extent,
@@ -150,10 +150,12 @@ pub fn whole(
     let mut displacement: Option<(&DisplacementGrid, Extent, Vec<[i16; 2]>)> = None;
     for (grid, [x, y]) in grids {
         let spacing = grid.spacing();
-        let (_, points, codes) = displacement.get_or_insert_with(|| {
-            let points = DisplacementGrid::points_over(camera, spacing);
-            (grid, points, vec![[0; 2]; points.area()])
-        });
+        let points = DisplacementGrid::points_over(camera, spacing);
+        if !DisplacementGrid::is_allowed(points) {
+            return Err(GeometryError::Displacement);
+        }
+        let (_, points, codes) =
+            displacement.get_or_insert_with(|| (grid, points, vec![[0; 2]; points.area()]));
         let [column, row] = [x, y].map(|first| first / spacing);
         for ((i, j), code) in grid.points().cells().zip(grid.codes()) {
             let (i, j) = (column + i, row + j);
@@ -165,7 +167,7 @@ pub fn whole(
     let displacement = displacement.map(|(grid, points, codes)| {
         DisplacementGrid::new(grid.spacing(), grid.step(), points, codes)
     });
-    Ok(Geometry {
+    let geometry = Geometry {
         camera,
         light,
         window: first.window,
@@ -175,7 +177,8 @@ pub fn whole(
             origin: ShardOrigin::ZERO,
         },
         tile_side: first.tile_side,
-    })
+    };
+    geometry.validate()
 }
 
 /// The control points of a shard of `camera` pixels.

@@ -60,8 +60,8 @@ pub(super) fn dense_transport(
 ) -> DenseTransport {
     let geometry = known.geometry();
     executor.map(geometry.camera.area(), |n| {
-        let width = geometry.camera.width;
-        let (x, y) = (n as u32 % width, n as u32 / width);
+        let width = geometry.camera.width as usize;
+        let (x, y) = ((n % width) as u32, (n / width) as u32);
         let pixel = CameraPixel { x, y };
         let mut function = vec![[0.0; CHANNELS]; geometry.window.area()];
         known.transport_function(pixel, &mut function);

@@ -66,7 +66,7 @@ impl DisplacementGrid {
     ) -> Result<Self, GeometryError> {
         let is_step = step.is_finite() && step > 0.0;
         let is_spacing = (Self::MIN_SPACING..=Self::MAX_SPACING).contains(&spacing);
-        let is_grid = points.width >= 2 && points.height >= 2 && points.area() <= Self::MAX_POINTS;
+        let is_grid = points.width >= 2 && points.height >= 2 && Self::is_allowed(points);
         match is_step && is_spacing && is_grid && codes.len() == points.area() {
             true => Ok(Self {
                 spacing,
@@ -76,6 +76,11 @@ impl DisplacementGrid {
             }),
             false => Err(GeometryError::Displacement),
         }
+    }
+
+    /// Whether there are not too many control points.
+    pub fn is_allowed(points: Extent) -> bool {
+        !points.is_too_large() && points.area() <= Self::MAX_POINTS
     }
 
     /// The control points that a camera grid needs.

@@ -13,8 +13,11 @@ use super::light_region::LightRegion;
 
 /// Camera channels: red, green, blue.
 pub const CHANNELS: usize = 3;
-/// Maximum side of the camera grid and the light plane; products of sides and channels fit in `u64`.
-pub const MAX_SIDE: u32 = 1 << 15;
+/// Maximum side of the camera grid and the light plane.
+pub const MAX_SIDE: u32 = 1 << 20;
+/// Maximum number of cells of either. The number of tiles fits in `u32`, and that of cells in `usize`, which has 32 bits in
+/// WebAssembly.
+pub const MAX_AREA: u64 = if usize::BITS > 32 { 1 << 36 } else { 1 << 30 };
 /// Maximum side of a window: an object that needs more is not nearly planar.
 pub const MAX_WINDOW: u32 = 63;
 
@@ -46,6 +49,16 @@ impl Extent {
     /// Number of cells.
     pub fn area(self) -> usize {
         self.width as usize * self.height as usize
+    }
+
+    /// Whether there are more than [`MAX_AREA`] cells; [`area`](Self::area) may overflow then.
+    pub fn is_too_large(self) -> bool {
+        self.area_u64() > MAX_AREA
+    }
+
+    /// Number of cells, whatever the sides are.
+    pub fn area_u64(self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
     }
 }
 
@@ -86,7 +99,8 @@ impl LightElement {
     /// Row-major index on a light plane of this extent, or `None` off it.
     pub fn index_in(self, light: Extent) -> Option<usize> {
         let (u, v) = (u32::try_from(self.u).ok()?, u32::try_from(self.v).ok()?);
-        (u < light.width && v < light.height).then(|| (v * light.width + u) as usize)
+        (u < light.width && v < light.height)
+            .then(|| v as usize * light.width as usize + u as usize)
     }
 }
 
@@ -211,6 +225,23 @@ impl Geometry {
     /// # Errors
     /// If a field is out of range; the error names it.
     pub fn check(&self) -> Result<(), GeometryError> {
+        self.check_area()?;
+        self.check_fields()
+    }
+
+    /// Checks the numbers of camera pixels and light elements.
+    ///
+    /// # Errors
+    /// [`GeometryError::Area`] if there are too many.
+    pub fn check_area(&self) -> Result<(), GeometryError> {
+        let cells = self.camera.area_u64().max(self.light.area_u64());
+        match cells > MAX_AREA {
+            true => Err(GeometryError::Area(cells)),
+            false => Ok(()),
+        }
+    }
+
+    fn check_fields(&self) -> Result<(), GeometryError> {
         let names = [
             "camera width",
             "camera height",
@@ -256,7 +287,7 @@ impl Geometry {
         [camera, light, [self.window.side, self.tile_side]]
     }
 
-    /// The geometry with these [`sides`](Self::sides), [checked](Self::check).
+    /// The geometry with these [`sides`](Self::sides), checked but for its [area](Self::check_area).
     ///
     /// # Errors
     /// If a field is out of range; the error names it.
@@ -272,7 +303,7 @@ impl Geometry {
             correspondence,
             tile_side,
         };
-        geometry.validate()
+        geometry.check_fields().map(|()| geometry)
     }
 
     /// The light plane, or the part of its level's that a shard sees.
@@ -401,6 +432,9 @@ pub enum GeometryError {
         /// The value given.
         value: u32,
     },
+    /// A grid has so many cells, more than [`MAX_AREA`].
+    #[error("too many pixels or light elements")]
+    Area(u64),
     /// The side of the window is even or too large.
     #[error("window side is {0}; it must be odd and at most {MAX_WINDOW}")]
     Window(u32),
@@ -420,6 +454,32 @@ pub enum GeometryError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn grids_are_bounded_by_side_and_area() {
+        let of = |camera: [u32; 2], light: [u32; 2]| {
+            let correspondence = Correspondence::from_affine([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+            Geometry::from_sides([camera, light, [9, 8]], correspondence)?.validate()
+        };
+        let side = |name, value| GeometryError::Side { name, value };
+        let long = of([MAX_SIDE, 1 << 16], [1 << 16, MAX_SIDE]).unwrap();
+        let last = long.tile(long.tile_grid().area() - 1);
+        let end = [last.x + last.extent.width, last.y + last.extent.height];
+        assert_eq!(end, [MAX_SIDE, 1 << 16]);
+        let corner = LightElement {
+            u: (1 << 16) - 1,
+            v: MAX_SIDE as i32 - 1,
+        };
+        assert_eq!(corner.index_in(long.light), Some(long.light.area() - 1));
+        assert_eq!(
+            of([MAX_SIDE + 1, 1], [9, 9]),
+            Err(side("camera width", MAX_SIDE + 1))
+        );
+        let wide = [(1 << 16) + 1, MAX_SIDE];
+        let area = GeometryError::Area((1 << 36) + (1 << 20));
+        assert_eq!(of(wide, [9, 9]), Err(area));
+        assert_eq!(of([9, 9], wide), of(wide, [9, 9]));
+    }
 
     #[test]
     fn windows_are_clipped_to_the_light_plane() {

@@ -41,8 +41,8 @@ pub(crate) use function_codes::end_pixel;
 pub use function_codes::{FunctionCodes, FunctionEntry, entries_by_pixel, entry_slot};
 pub(crate) use geometry::ClippedRect;
 pub use geometry::{
-    CHANNELS, CameraPixel, Extent, Geometry, GeometryError, LightElement, LightPosition, MAX_SIDE,
-    MAX_WINDOW, TileRect, Window,
+    CHANNELS, CameraPixel, Extent, Geometry, GeometryError, LightElement, LightPosition, MAX_AREA,
+    MAX_SIDE, MAX_WINDOW, TileRect, Window,
 };
 pub use known_transport::{KnownTransport, transport_error};
 pub use light_region::LightRegion;

@@ -132,3 +132,46 @@ fn enlarge(from: &Path, to: &Path, seed: u64, enlargement: Enlargement) {
         )
         .unwrap();
 }
+
+/// Repeats all photographs and patterns of the capture `small` from left to right, `count` times. It has no Gray code.
+pub fn repeat_capture(small: &Path, wide: &Path, count: u32) {
+    let json = fs::read(small.join("capture.json")).unwrap();
+    let mut manifest: Value = serde_json::from_slice(&json).unwrap();
+    manifest.as_object_mut().unwrap().remove("graycode");
+    let shots = manifest["shots"].as_array().unwrap();
+    let patterns = shots
+        .iter()
+        .flat_map(|shot| [&shot["photo"], &shot["pattern"]]);
+    for name in patterns.chain([&manifest["dark"], &manifest["flood"]]) {
+        let name = name.as_str().unwrap();
+        fs::create_dir_all(wide.join(name).parent().unwrap()).unwrap();
+        repeat(&small.join(name), &wide.join(name), count);
+    }
+    for grid in ["camera", "light"] {
+        let width = manifest[grid]["width"].as_u64().unwrap();
+        manifest[grid]["width"] = json!(width * u64::from(count));
+    }
+    fs::write(wide.join("capture.json"), manifest.to_string()).unwrap();
+}
+
+fn repeat(from: &Path, to: &Path, count: u32) {
+    let (small, width) = (
+        image::open(from).unwrap(),
+        count * image::image_dimensions(from).unwrap().0,
+    );
+    let height = small.height();
+    let bytes = small.as_bytes();
+    let row_bytes = bytes.len() / height as usize;
+    let rows = bytes
+        .chunks_exact(row_bytes)
+        .map(|row| row.repeat(count as usize));
+    let file = std::io::BufWriter::new(fs::File::create(to).unwrap());
+    PngEncoder::new_with_quality(file, CompressionType::Fast, FilterType::Sub)
+        .write_image(
+            &rows.collect::<Vec<_>>().concat(),
+            width,
+            height,
+            small.color().into(),
+        )
+        .unwrap();
+}

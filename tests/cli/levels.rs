@@ -7,6 +7,7 @@ use image::RgbImage;
 use tempfile::TempDir;
 
 use crate::commands::{error_message, json, run, small_ltm, text};
+use crate::enlargement::repeat_capture;
 
 /// A file of three levels in shards of 256 pixels; level 0 has 523 x 41.
 fn fixture() -> PathBuf {
@@ -327,4 +328,52 @@ fn pictures_are_recovered_with_levels_and_evaluated() {
             "tiny.ltm.checkpoint"
         ]
     );
+}
+
+#[test]
+fn pictures_are_wider_than_sixteen_bits_can_count() {
+    let folder = TempDir::new().unwrap();
+    let (small, wide) = (folder.path().join("small"), folder.path().join("wide"));
+    let sides = ["--camera", "256x8", "--light", "128x4", "--patterns", "12"];
+    let simulate = ["simulate", "cookies", "-o", text(&small)];
+    let output = run(&[&simulate[..], &sides].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    // So wide that the TIFFs of the copy have strips of fewer rows than others.
+    let (count, file) = (343, folder.path().join("wide.ltm"));
+    repeat_capture(&small, &wide, count);
+    let copy = folder.path().join("copy");
+    let output = run(&["stage", "ingest", text(&wide), "-o", text(&copy)]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let recover = ["recover", text(&copy), "-o", text(&file)];
+    let report = json(
+        &[
+            &recover[..],
+            &["--window", "3", "--method", "nnls", "--json"],
+        ]
+        .concat(),
+    );
+    let width = 256 * count;
+    assert!(width > 87_381);
+    assert!(report["levels"].as_u64().unwrap() > 5, "{report}");
+    let evaluated = json(&["evaluate", text(&file), text(&wide), "--json"]);
+    let snr = evaluated["heldout_snr_db"].as_f64().unwrap();
+    assert!(snr > 20.0, "{evaluated}");
+
+    // The picture repeats from end to end, as the photographs do.
+    let out = folder.path().join("flood.png");
+    let relight = ["relight", text(&file), "--light", "flood", "-o", text(&out)];
+    let output = run(&relight);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let relit = image::open(out).unwrap().to_rgb8();
+    assert_eq!(relit.dimensions(), (width, 8));
+    let difference = |x: u32, y: u32| {
+        let pixels = [2, 255].map(|i| relit.get_pixel(256 * i + x, y).0);
+        (0..3).map(move |c| u64::from(pixels[0][c].abs_diff(pixels[1][c])))
+    };
+    let differences = (0..256).flat_map(|x| (0..8).flat_map(move |y| difference(x, y)));
+    let sum: u64 = differences.sum();
+    assert!(sum < 3 * 256 * 8 * 4, "{sum}");
 }

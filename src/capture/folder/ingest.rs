@@ -14,13 +14,13 @@ use super::CaptureFolder;
 use super::files::CaptureFiles;
 use super::ingest_record::{CodeHistogram, IngestRecord, IngestSource};
 use super::photograph_codes::PhotographCodes;
-use super::picture_tiff::TAG_BYTES;
+use super::picture_tiff::{MAX_STRIP_BYTES, TAG_BYTES};
 use crate::capture::error::CaptureError;
 use crate::capture::manifest::ListedPhotograph;
 use crate::tiff_signature::is_tiff;
 use crate::transport::{CHANNELS, Extent};
 
-/// Rows of a strip.
+/// Rows of a strip, if they are not too large to be read.
 const STRIP_ROWS: u32 = 16;
 /// Largest strip that is read to write smaller ones.
 const MAX_INGESTED_STRIP_BYTES: usize = 1 << 30;
@@ -48,7 +48,7 @@ impl From<TiffError> for IngestError {
 }
 
 impl<F: CaptureFiles> CaptureFolder<F> {
-    /// Writes a photograph that the manifest names as an uncompressed TIFF in strips of 16 rows, with a record: its `source`, a
+    /// Writes a photograph that the manifest names as an uncompressed TIFF in strips of 16 rows at most, with a record: its `source`, a
     /// checksum of each strip, and a histogram of all codes. The codes are unchanged.
     ///
     /// # Errors
@@ -78,14 +78,15 @@ pub(super) fn write<F: CaptureFiles, W: Write + Seek, K: TiffKind>(
     let Extent { width, height } = photograph.extent();
     let mut encoder = TiffEncoder::<W, K>::new_generic(out)?;
     let mut image = encoder.new_image::<RGB16>(width, height)?;
-    image.rows_per_strip(STRIP_ROWS.min(height))?;
+    let rows_of_strip = strip_rows(width).min(height);
+    image.rows_per_strip(rows_of_strip)?;
     let (mut checksums, mut histogram) = (Vec::new(), CodeHistogram::empty());
     let mut strip: Vec<[u16; CHANNELS]> = Vec::new();
     for y in 0..height {
         if let Some(row) = photograph.next()? {
             strip.extend_from_slice(row);
         }
-        if (y + 1) % STRIP_ROWS == 0 || y + 1 == height {
+        if (y + 1) % rows_of_strip == 0 || y + 1 == height {
             let samples = strip.as_flattened();
             image.write_strip(samples)?;
             checksums.push(crc32c::crc32c(bytemuck::cast_slice(samples)));
@@ -96,6 +97,12 @@ pub(super) fn write<F: CaptureFiles, W: Write + Seek, K: TiffKind>(
     photograph.finish([u32::MAX; CHANNELS])?;
     IngestRecord::write(image.encoder(), source, checksums, &histogram)?;
     Ok(image.finish()?)
+}
+
+/// Rows of a strip of pictures of this width.
+fn strip_rows(width: u32) -> u32 {
+    let row_bytes = size_of::<[u16; CHANNELS]>() * width as usize;
+    ((MAX_STRIP_BYTES / row_bytes.max(1)) as u32).clamp(1, STRIP_ROWS)
 }
 
 /// A TIFF of [`CaptureFolder::ingest`], by its record.
@@ -133,6 +140,21 @@ impl IngestedPhotograph {
             })),
             Err(TiffError::IoError(error)) if error.raw_os_error().is_some() => Err(error),
             Err(_) => Ok(None),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::MAX_SIDE;
+
+    #[test]
+    fn strips_of_every_width_can_be_read() {
+        assert_eq!(strip_rows(1000), STRIP_ROWS);
+        for width in [1, 87_381, 87_382, 500_000, MAX_SIDE] {
+            let bytes = strip_rows(width) as usize * width as usize * 6;
+            assert!(bytes <= MAX_STRIP_BYTES, "{width}");
         }
     }
 }

@@ -319,12 +319,26 @@ impl<F: CaptureFiles> CaptureFolder<F> {
     /// # Panics
     /// If there is no such shot.
     pub fn read_pattern(&self, i: usize) -> Result<Pattern, CaptureError> {
-        let name = &self.manifest.shots[i].pattern;
-        let (light, field) = (self.manifest.light.extent(), format!("shots[{i}].pattern"));
-        let file = PictureFile::new(&self.files, name, light, Some(field));
-        let (_, mut pattern) = file.read_pattern(&self.emission)?;
+        let (_, mut pattern) = self.pattern(i).read_pattern(&self.emission)?;
         self.manifest.light.dim(&mut pattern);
         Ok(pattern)
+    }
+
+    /// Number of planes of the pattern of shot `i`, by the head of its file: 1 if it is grey, 3 if it is coloured.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is no pattern of the light plane's size.
+    pub fn pattern_planes(&self, i: usize) -> Result<usize, CaptureError> {
+        self.pattern(i).pattern_planes()
+    }
+
+    fn pattern(&self, i: usize) -> PictureFile<'_, F> {
+        let light = self.manifest.light.extent();
+        let (name, field) = (
+            &self.manifest.shots[i].pattern,
+            format!("shots[{i}].pattern"),
+        );
+        PictureFile::new(&self.files, name, light, Some(field))
     }
 
     /// Measurements of `shots` without any camera pixels yet. Their noise has only its floor.

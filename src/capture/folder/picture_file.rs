@@ -46,6 +46,11 @@ impl<'a, F: CaptureFiles> PictureFile<'a, F> {
         picture_png::read_pattern(self, emission)
     }
 
+    /// Number of planes of an 8-bit pattern.
+    pub fn pattern_planes(&self) -> Result<usize, CaptureError> {
+        picture_png::pattern_planes(self)
+    }
+
     /// The size and the codes of a 16-bit photograph.
     pub fn read_codes(self) -> Result<(Extent, Vec<[u16; CHANNELS]>), CaptureError> {
         let mut rows = self.open_codes()?;

@@ -22,13 +22,7 @@ pub(super) fn read_pattern<F: CaptureFiles>(
     file: &PictureFile<'_, F>,
     emission: &[f64; 256],
 ) -> Result<(Extent, Pattern), CaptureError> {
-    // Some programs store black and white in one bit, or in a palette.
-    let mut reader = open(file, Transformations::EXPAND)?;
-    let channels = match reader.output_color_type() {
-        (ColorType::Grayscale, BitDepth::Eight) => 1,
-        (ColorType::Rgb, BitDepth::Eight) => CHANNELS,
-        other => return Err(file.error(CaptureErrorKind::PatternType(sample_type(other)))),
-    };
+    let (mut reader, channels) = open_pattern(file)?;
     let extent = extent_of(&reader);
     let mut codes = vec![0; channels * extent.area()];
     let decoded = reader.next_frame(&mut codes);
@@ -40,6 +34,26 @@ pub(super) fn read_pattern<F: CaptureFiles>(
         _ => Pattern::Rgb(std::array::from_fn(plane)),
     };
     Ok((extent, pattern))
+}
+
+/// Number of planes of an 8-bit pattern.
+pub(super) fn pattern_planes<F: CaptureFiles>(
+    file: &PictureFile<'_, F>,
+) -> Result<usize, CaptureError> {
+    Ok(open_pattern(file)?.1)
+}
+
+/// Opens a pattern. Returns its number of channels as well.
+fn open_pattern<'a, F: CaptureFiles>(
+    file: &PictureFile<'a, F>,
+) -> Result<(PngReader<'a, F>, usize), CaptureError> {
+    // Some programs store black and white in one bit, or in a palette.
+    let reader = open(file, Transformations::EXPAND)?;
+    match reader.output_color_type() {
+        (ColorType::Grayscale, BitDepth::Eight) => Ok((reader, 1)),
+        (ColorType::Rgb, BitDepth::Eight) => Ok((reader, CHANNELS)),
+        other => Err(file.error(CaptureErrorKind::PatternType(sample_type(other)))),
+    }
 }
 
 fn open<'a, F: CaptureFiles>(

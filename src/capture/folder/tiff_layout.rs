@@ -31,23 +31,24 @@ impl SampleType {
 
     /// The codes of samples as the decoder gives them. `None` if one is not a number.
     pub fn codes(self, bytes: &[u8], codes: &mut [u16]) -> Option<()> {
-        fn each<const BYTES: usize>(
+        fn convert<const BYTES: usize>(
             bytes: &[u8],
             codes: &mut [u16],
             code: impl Fn([u8; BYTES]) -> Option<u16>,
         ) -> Option<()> {
             let (samples, _) = bytes.as_chunks();
-            for (own, sample) in codes.iter_mut().zip(samples) {
-                *own = code(*sample)?;
+            debug_assert_eq!(codes.len(), samples.len());
+            for (converted, sample) in codes.iter_mut().zip(samples) {
+                *converted = code(*sample)?;
             }
             Some(())
         }
         match self {
-            Self::U16 => each(bytes, codes, |sample| Some(u16::from_ne_bytes(sample))),
-            Self::F16 => each(bytes, codes, |sample| {
+            Self::U16 => convert(bytes, codes, |sample| Some(u16::from_ne_bytes(sample))),
+            Self::F16 => convert(bytes, codes, |sample| {
                 float_code(f16::from_ne_bytes(sample).to_f32())
             }),
-            Self::F32 => each(bytes, codes, |sample| {
+            Self::F32 => convert(bytes, codes, |sample| {
                 float_code(f32::from_ne_bytes(sample))
             }),
         }
@@ -66,7 +67,7 @@ pub(super) struct Layout {
     pub strip_rows: u32,
     color: ColorType,
     /// Samples of a pixel, with those that are no colour.
-    samples: u16,
+    samples_per_pixel: u16,
     /// The number of [`Tag::SampleFormat`], if all samples have one.
     format: Option<u16>,
     is_tiled: bool,
@@ -84,10 +85,13 @@ impl Layout {
             extent: Extent::new(width, height),
             strip_rows: decoder.chunk_dimensions().1.min(height).max(1),
             color: decoder.colortype()?,
-            samples: decoder
+            samples_per_pixel: decoder
                 .find_tag_unsigned(Tag::SamplesPerPixel)?
                 .unwrap_or(1),
-            format: { formats.iter().all(|format| *format == first) }.then_some(first),
+            format: formats
+                .iter()
+                .all(|format| *format == first)
+                .then_some(first),
             is_tiled: decoder.get_chunk_type() == ChunkType::Tile,
             is_planar: planes == Some(PlanarConfiguration::Planar.to_u16()),
         })
@@ -104,8 +108,9 @@ impl Layout {
             _ => return Err(CaptureErrorKind::PhotoType(self.name())),
         };
         // The decoder would leave the others out, after it has undone a predictor with a wrong number of samples.
-        if usize::from(self.samples) != CHANNELS {
-            let found = format!("{} with {} samples a pixel", self.name(), self.samples);
+        if usize::from(self.samples_per_pixel) != CHANNELS {
+            let (name, count) = (self.name(), self.samples_per_pixel);
+            let found = format!("{name} with {count} samples a pixel");
             return Err(CaptureErrorKind::PhotoType(found));
         }
         if self.is_tiled {
@@ -123,11 +128,9 @@ impl Layout {
 
     /// The type of samples and pixels, for messages.
     fn name(&self) -> String {
-        let is_float = self.format == Some(SampleFormat::IEEEFP.to_u16());
-        let is_integer = self.format == Some(SampleFormat::Uint.to_u16());
-        let numbers = match (is_integer, is_float) {
-            (true, _) => "",
-            (_, true) => " floating-point",
+        let numbers = match self.format.map(SampleFormat::from_u16_exhaustive) {
+            Some(SampleFormat::Uint) => "",
+            Some(SampleFormat::IEEEFP) => " floating-point",
             _ => " signed or mixed",
         };
         let bits = self.color.bit_depth();
@@ -153,7 +156,7 @@ mod tests {
             extent: Extent::new(60_000, 60_000),
             strip_rows: 60_000,
             color: ColorType::RGB(16),
-            samples: 3,
+            samples_per_pixel: 3,
             format: Some(SampleFormat::Uint.to_u16()),
             is_tiled: false,
             is_planar: false,

@@ -11,7 +11,7 @@ use crate::export::{
     CaptureSize, EncodingMemory, FILE_TILE_SIDE, MemoryPlan, TooLittleMemory, select_shots,
 };
 use crate::recover::{MIN_PATTERNS, RecoverError};
-use crate::transport::{Geometry, Window};
+use crate::transport::{CHANNELS, Geometry, Window};
 
 /// A capture, and what is recovered from it.
 pub struct RecoveryInputs<'a> {
@@ -92,12 +92,18 @@ impl<'a> RecoveryInputs<'a> {
             .map_err(messages::too_little_memory)
     }
 
+    /// Planes of the pattern of a shot; of one that cannot be read the most there may be, and who reads it tells the error.
+    fn pattern_planes(&self, shot: usize) -> usize {
+        self.folder.pattern_planes(shot).unwrap_or(CHANNELS)
+    }
+
     fn capture_size(&self) -> CaptureSize {
         let manifest = self.folder.manifest();
         CaptureSize {
             camera: manifest.camera.extent(),
             light: manifest.light.extent(),
             shots: self.shots.len(),
+            pattern_planes: self.shots.iter().map(|&i| self.pattern_planes(i)).sum(),
             gray_code: match manifest.correspondence {
                 Some(_) => 0,
                 None => manifest.graycode.len(),

@@ -144,7 +144,13 @@ impl TextureLayout {
         let side = |extent: Extent| u64::from(extent.width.max(extent.height));
         let light_side = side(if is_factored { response } else { light });
         check_limit("columns or rows of camera pixels", side(camera), max_side)?;
-        check_limit("columns or rows of light elements", light_side, max_side)?;
+        // Window origins have 16 bits.
+        let max_light_side = max_side.min(i16::MAX as u64);
+        check_limit(
+            "columns or rows of light elements",
+            light_side,
+            max_light_side,
+        )?;
         let max_layers = u64::from(limits.max_layers);
         check_limit("layers of components", response_layers.into(), max_layers)?;
         let bytes = response.area() as u64 * u64::from(response_layers) * 16;

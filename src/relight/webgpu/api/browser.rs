@@ -176,7 +176,7 @@ impl DeviceAndQueue {
             ("texture", texture.texture.clone().into()),
             ("origin", list(at.map(JsValue::from))),
         ]);
-        let row = texels.len() as u32 / extent.height;
+        let row = (texels.len() / extent.height as usize) as u32;
         let layout = dictionary(&[("bytesPerRow", row.into())]);
         self.queue
             .write_texture(&to, texels, &layout, &size(extent, 1));

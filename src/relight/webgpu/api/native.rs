@@ -190,7 +190,7 @@ impl DeviceAndQueue {
             texels,
             wgpu::TexelCopyBufferLayout {
                 offset: 0,
-                bytes_per_row: Some(texels.len() as u32 / extent.height),
+                bytes_per_row: Some((texels.len() / extent.height as usize) as u32),
                 rows_per_image: None,
             },
             size(extent, 1),
