@@ -10,8 +10,9 @@ pub(super) const SCAN_RECORD_BYTES: usize = 24;
 pub(super) const CHUNK_ENTRY_BYTES: usize = 12;
 /// Maximum number of basis functions: those that a window of 31 x 31 elements can distinguish.
 pub const MAX_RANK: u16 = 1024;
-/// Maximum number of camera pixels, and of light elements.
-pub(super) const MAX_CELLS: u64 = 1 << 36;
+/// Maximum number of camera pixels, and of light elements. A program with 32-bit addresses reads fewer
+/// ([`MAX_AREA`](crate::transport::MAX_AREA)).
+pub(super) const MAX_FILE_AREA: u64 = 1 << 36;
 /// Maximum number of tiles.
 #[cfg(not(target_arch = "wasm32"))]
 pub(super) const MAX_TILES: u32 = 1 << 24;

@@ -2,7 +2,7 @@
 
 use super::checksum::{check_crc, checksum};
 use super::constants::{
-    HEADER_BYTES, MAX_CELLS, MAX_EXTENSION_BYTES, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS,
+    HEADER_BYTES, MAX_EXTENSION_BYTES, MAX_FILE_AREA, MAX_METADATA_BYTES, MAX_RANK, MAX_SCANS,
 };
 use super::error::{FormatError, SectionName, TextModeDamage};
 use super::fields::FieldReader;
@@ -122,7 +122,7 @@ impl Header {
             metadata: section(),
         };
         header.geometry.check_area().map_err(invalid_geometry)?;
-        // At most 2^30: a tile has 8 x 8 pixels or lies at a border. Pictures of WebAssembly never have too many.
+        // At most 2^30: a tile has 8 x 8 pixels or lies at a border. In WebAssembly the area bounds them nearly as well.
         #[cfg(not(target_arch = "wasm32"))]
         let tiles = header.geometry.tile_grid().area() as u32;
         let (extensions, metadata) = (header.extensions.bytes, header.metadata.bytes);
@@ -156,7 +156,7 @@ impl Header {
 /// A valid picture may be larger than a program with 32-bit addresses can hold.
 fn invalid_geometry(error: GeometryError) -> FormatError {
     match error {
-        GeometryError::Area(cells) if cells <= MAX_CELLS => FormatError::Limit {
+        GeometryError::Area(cells) if cells <= MAX_FILE_AREA => FormatError::Limit {
             need: memory_estimate::RELIT_CELL_BYTES * cells,
             limit: usize::MAX as u64,
         },

@@ -122,15 +122,8 @@ fn enlarge(from: &Path, to: &Path, seed: u64, enlargement: Enlargement) {
             }
         }
     }
-    let file = std::io::BufWriter::new(fs::File::create(to).unwrap());
-    PngEncoder::new_with_quality(file, CompressionType::Fast, FilterType::Sub)
-        .write_image(
-            &bytes,
-            width * factor,
-            height * factor,
-            ExtendedColorType::Rgb16,
-        )
-        .unwrap();
+    let sides = [width * factor, height * factor];
+    write_png(to, &bytes, sides, ExtendedColorType::Rgb16);
 }
 
 /// Repeats all photographs and patterns of the capture `small` from left to right, `count` times. It has no Gray code.
@@ -155,23 +148,19 @@ pub fn repeat_capture(small: &Path, wide: &Path, count: u32) {
 }
 
 fn repeat(from: &Path, to: &Path, count: u32) {
-    let (small, width) = (
-        image::open(from).unwrap(),
-        count * image::image_dimensions(from).unwrap().0,
-    );
-    let height = small.height();
+    let small = image::open(from).unwrap();
+    let (width, height) = (small.width() * count, small.height());
     let bytes = small.as_bytes();
-    let row_bytes = bytes.len() / height as usize;
     let rows = bytes
-        .chunks_exact(row_bytes)
+        .chunks_exact(bytes.len() / height as usize)
         .map(|row| row.repeat(count as usize));
-    let file = std::io::BufWriter::new(fs::File::create(to).unwrap());
+    let bytes = rows.collect::<Vec<_>>().concat();
+    write_png(to, &bytes, [width, height], small.color().into());
+}
+
+fn write_png(path: &Path, bytes: &[u8], [width, height]: [u32; 2], color: ExtendedColorType) {
+    let file = std::io::BufWriter::new(fs::File::create(path).unwrap());
     PngEncoder::new_with_quality(file, CompressionType::Fast, FilterType::Sub)
-        .write_image(
-            &rows.collect::<Vec<_>>().concat(),
-            width,
-            height,
-            small.color().into(),
-        )
+        .write_image(bytes, width, height, color)
         .unwrap();
 }

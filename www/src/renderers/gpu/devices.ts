@@ -96,7 +96,7 @@ export class Devices {
       return { graphics, fail, release };
     } catch (thrown) {
       device.holders.delete(holder);
-      // It may be open by then in use by others.
+      // By then it may be in use by others.
       const closeUnused = (): void => {
         if (device.holders.size === 0) this.#close(backend, device);
       };
