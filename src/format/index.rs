@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::checksum::check_crc;
 use super::chunk::{ChunkEntry, ChunkId};
-use super::codec::zstd_frame::{compress, decompress};
+use super::codec::zstd_frame::{compress_large, decompress};
 use super::constants::{HEADER_BYTES, MAX_RANK};
 use super::directory;
 use super::displacement;
@@ -142,7 +142,7 @@ impl FileIndex {
     ) -> Result<(Self, Vec<u8>), FormatError> {
         #[cfg(not(target_arch = "wasm32"))]
         check_tags(&extensions)?;
-        let directory = compress(&directory::encode(&scans, &entries))?;
+        let directory = compress_large(&directory::encode(&scans, &entries))?;
         let displacement = geometry.correspondence.displacement.as_ref();
         let displacement = displacement
             .map(|grid| displacement::encode(grid))
