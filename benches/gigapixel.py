@@ -3,7 +3,7 @@
 python3 gigapixel.py [--program ltm-export] [--side 16384] [--patterns 80] [--tiles 65536] [--report FILE.json]
 
 A capture of 1,024 x 1,024 pixels and 128 x 128 light elements is simulated and repeated along both axes. Its
-photographs are TIFFs as `ltm-export stage ingest` writes them, but strips that repeat are in the file once only.
+photographs are TIFFs as `ltm-export stage ingest` writes them, but tiles that repeat are in the file once only.
 
   plan, learn   of `--side` pixels a side, with the default options
   assemble      of a picture of one level in so many tiles, of the packs of 256 shards. The first shard is recovered,
@@ -30,8 +30,9 @@ import zstandard
 from crc32c import crc32c
 
 REPO = Path(__file__).resolve().parent.parent
+# Also the columns of a TIFF tile.
 SMALL_SIDE = 1024
-STRIP_ROWS = 16
+TILE_ROWS = 16
 CODES = 1 << 16
 TILE_SIDE = 128
 SHARDS = 256
@@ -117,37 +118,36 @@ def repeat_photograph(small, large, name, repeats):
     """Writes a repeated photograph as an ingested TIFF. Returns its name."""
     codes = cv2.imread(str(small / name), cv2.IMREAD_UNCHANGED)[:, :, ::-1]
     side = SMALL_SIDE * repeats
-    strips = [
-        numpy.tile(rows, (1, repeats, 1)).astype("<u2").tobytes()
-        for rows in numpy.split(codes, SMALL_SIDE // STRIP_ROWS)
-    ]
+    tiles = [rows.astype("<u2").tobytes() for rows in numpy.split(codes, SMALL_SIDE // TILE_ROWS)]
     counts = [numpy.bincount(codes[:, :, c].ravel(), minlength=CODES) for c in range(3)]
     histogram = zstandard.compress((numpy.array(counts, dtype="<u8") * repeats**2).tobytes())
     file = (small / name).read_bytes()
     source = {"name": name, "bytes": len(file), "sha256": hashlib.sha256(file).hexdigest()}
     source = json.dumps(source, separators=(",", ":")).encode()
-    checksums = [*[crc32c(strip) for strip in strips] * repeats, crc32c(histogram)]
+    checksums = [*repeat_tiles([crc32c(tile) for tile in tiles], repeats), crc32c(histogram)]
     checksums = struct.pack(f"<{len(checksums)}I", *checksums)
     name = str(Path(name).with_suffix(".tif"))
     (large / name).parent.mkdir(parents=True, exist_ok=True)
     with open(large / name, "wb") as out:
         out.write(b"II*\0\0\0\0\0")
         offsets = []
-        for strip in strips:
+        for tile in tiles:
             offsets.append(out.tell())
-            out.write(strip)
-        offsets = struct.pack(f"<{len(offsets) * repeats}I", *offsets * repeats)
-        lengths = struct.pack("<I", len(strips[0])) * (len(strips) * repeats)
+            out.write(tile)
+        offsets = repeat_tiles(offsets, repeats)
+        lengths = struct.pack("<I", len(tiles[0])) * len(offsets)
+        offsets = struct.pack(f"<{len(offsets)}I", *offsets)
         tags = [
             (256, "I", struct.pack("<I", side)),
             (257, "I", struct.pack("<I", side)),
             (258, "H", struct.pack("<3H", 16, 16, 16)),
             (259, "H", struct.pack("<H", 1)),
             (262, "H", struct.pack("<H", 2)),
-            (273, "I", offsets),
             (277, "H", struct.pack("<H", 3)),
-            (278, "I", struct.pack("<I", STRIP_ROWS)),
-            (279, "I", lengths),
+            (322, "I", struct.pack("<I", SMALL_SIDE)),
+            (323, "I", struct.pack("<I", TILE_ROWS)),
+            (324, "I", offsets),
+            (325, "I", lengths),
             (339, "H", struct.pack("<3H", 1, 1, 1)),
             (65100, "s", source + b"\0"),
             (65101, "B", histogram),
@@ -158,8 +158,13 @@ def repeat_photograph(small, large, name, repeats):
     return name
 
 
+def repeat_tiles(column, repeats):
+    """What each tile of a column has, for the tiles of the repeated picture, row by row."""
+    return [figure for figure in column for _ in range(repeats)] * repeats
+
+
 def write_directory(out, tags):
-    """Writes the tags of a TIFF, of type BYTE, ASCII, SHORT or LONG by their letters, after the strips."""
+    """Writes the tags of a TIFF, of type BYTE, ASCII, SHORT or LONG by their letters, after the tiles."""
     types = {"B": (1, 1), "s": (2, 1), "H": (3, 2), "I": (4, 4)}
     entries = []
     for tag, letter, values in tags:

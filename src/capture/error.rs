@@ -115,6 +115,9 @@ pub enum CaptureErrorKind {
     /// The file does not have the format given first, or is damaged.
     #[error("is not a readable {0}: {1}")]
     Unreadable(&'static str, String),
+    /// A tile of an ingested photograph, in the place that is given, was damaged after it was written.
+    #[error("has a wrong checksum in {0}")]
+    WrongChecksum(String),
     /// The size of a picture differs from the manifest's.
     #[error("is {found} pixels; {MANIFEST_NAME} says {expected}")]
     WrongExtent {
@@ -132,11 +135,11 @@ pub enum CaptureErrorKind {
     /// A photograph is interlaced and cannot be read row by row.
     #[error("is interlaced; photographs are read row by row")]
     Interlaced,
-    /// A TIFF is not one of strips of whole pixels.
-    #[error("{0}; photographs are read row by row, from strips of whole pixels")]
-    NotInStrips(&'static str),
-    /// A TIFF has strips of so many rows that they take too much memory.
-    #[error("has strips of {0} rows, which take too much memory")]
+    /// A TIFF has the samples of each channel in a plane of their own.
+    #[error("has a plane for each channel; photographs are read row by row, from whole pixels")]
+    Planar,
+    /// A TIFF has strips or tiles of so many rows that they take too much memory.
+    #[error("has strips or tiles of {0} rows, which take too much memory")]
     LargeStrips(u32),
     /// A file of known transport has the wrong form.
     #[error("{0}")]

@@ -15,13 +15,12 @@ pub fn capture_remedy(error: &CaptureError) -> Option<&'static str> {
         CaptureErrorKind::NoShots => "list the patterns and their photographs",
         CaptureErrorKind::MissingGrayCode { .. } => "add it, or give \"correspondence\"",
         CaptureErrorKind::Unreadable(..) => "export or copy it again",
+        CaptureErrorKind::WrongChecksum(_) => "delete it and run \"ltm-export stage ingest\" again",
         CaptureErrorKind::WrongExtent { .. } => "correct one of them",
         CaptureErrorKind::PhotoType(_) => "export it again from raw",
         CaptureErrorKind::PatternType(_) => "convert it",
         CaptureErrorKind::Interlaced => "save it without interlacing",
-        CaptureErrorKind::NotInStrips(_) => {
-            "save it in strips, with the channels of a pixel together"
-        }
+        CaptureErrorKind::Planar => "save it with the channels of a pixel together",
         CaptureErrorKind::LargeStrips(_) => "\"ltm-export stage ingest\" writes it in smaller ones",
         _ => return None,
     })

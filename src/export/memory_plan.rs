@@ -24,6 +24,9 @@ const RESAMPLED_BLOCK_PIXELS: u64 = 64;
 const RESAMPLED_BLOCK_BYTES: u64 = 32;
 /// Reading one photograph, beside its rows: a buffer and the decompressor's window.
 const READER_BYTES: u64 = 320 << 10;
+/// Pixels of a tile of an ingested photograph, at least, and its place, length and checksum.
+const TIFF_TILE_PIXELS: u64 = 16 * 512;
+const TIFF_TILE_BYTES: u64 = 20;
 /// Compressing one recovered tile for the checkpoint, beside the tile.
 const COMPRESSOR_BYTES: u64 = 24 << 20;
 /// One coefficient or element of all channels while its tile of the file is encoded: the value, its rounding error,
@@ -173,7 +176,8 @@ impl MemoryPlan {
                 .preparation_bytes(max_window, shots)
                 .max(PreparedRecovery::sample_bytes(max_window)) as u64
             + (size_of::<f32>() * pattern_planes * light.area()) as u64
-            + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width);
+            + photographs * (READER_BYTES + 4 * 2 * CHANNELS as u64 * width)
+            + photographs * (camera.area() as u64 / TIFF_TILE_PIXELS * TIFF_TILE_BYTES);
         // The functions of a tile as real numbers, as codes, and as byte planes to compress.
         let element = PIXEL_BYTES + 8 + 2 * CHANNELS as u64;
         let tile = COMPRESSOR_BYTES

@@ -3,13 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use relightable_photo::capture::{CameraPixelSet, CaptureFolder};
+
 use crate::stage::{Job, LEARNED, NNLS, fails, succeeds, text};
 
-/// Bytes of a row of 64 pixels, and rows of a strip.
+/// Bytes of a row of 64 pixels, and rows of a tile, of which one has all columns.
 const ROW_BYTES: usize = 64 * 6;
-const STRIP_ROWS: usize = 16;
-/// Where the first strip begins: after the header and the resolution.
-const STRIPS_START: usize = 24;
+const TILE_ROWS: usize = 16;
+/// Where the first tile begins: after the header, the resolution and the samples' type.
+const TILES_START: usize = 36;
 
 fn ingest<'a>(from: &'a Path, to: &'a Path) -> [&'a str; 5] {
     ["stage", "ingest", text(from), "-o", text(to)]
@@ -22,13 +24,13 @@ fn ingest_capture(job: &mut Job) -> PathBuf {
     std::mem::replace(&mut job.capture, copy)
 }
 
-/// Damages the strips of all photographs for whose numbers `is_damaged` is true.
+/// Damages the tiles of all photographs for whose numbers `is_damaged` is true.
 fn damage(capture: &Path, is_damaged: impl Fn(usize) -> bool) {
     for entry in fs::read_dir(capture.join("photos")).unwrap() {
         let path = entry.unwrap().path();
         let mut bytes = fs::read(&path).unwrap();
-        for strip in (0..400 / STRIP_ROWS).filter(|strip| is_damaged(*strip)) {
-            bytes[STRIPS_START + strip * STRIP_ROWS * ROW_BYTES + 7] ^= 1;
+        for tile in (0..400 / TILE_ROWS).filter(|tile| is_damaged(*tile)) {
+            bytes[TILES_START + tile * TILE_ROWS * ROW_BYTES + 7] ^= 1;
         }
         fs::write(&path, bytes).unwrap();
     }
@@ -67,21 +69,27 @@ fn an_ingested_capture_is_recovered_to_the_same_picture() {
 }
 
 #[test]
-fn a_shard_reads_only_its_strips() {
+fn a_shard_reads_only_its_rows() {
     let mut job = Job::new("64x400", &[], &LEARNED);
-    ingest_capture(&mut job);
+    let source = ingest_capture(&mut job);
     job.plan(&[]);
     job.learn();
     job.tiles("2/4");
     let pack = job.pack("2-of-4.pack");
     let expected = fs::read(&pack).unwrap();
     fs::remove_file(&pack).unwrap();
-    // Rows 128 to 255 and two more on either side: 10 strips of 16 rows, 1.25 times as many as 128 rows have.
-    damage(&job.capture, |strip| !(7..17).contains(&strip));
+    // Rows 128 to 255 and two more on either side: 10 tiles of 16 rows, 1.25 times as many as 128 rows have.
+    damage(&job.capture, |tile| !(7..17).contains(&tile));
     job.tiles("2/4");
     assert!(fs::read(&pack).unwrap() == expected);
-    for (shard, rows) in [("1/4", "rows 0 to 15 "), ("3/4", "rows 272 to 287 ")] {
-        fails(&job.tiles_args(shard), 65, &["photos/", rows]);
+    for (shard, rows) in [("1/4", "rows 0 to 15;"), ("3/4", "rows 272 to 287;")] {
+        let remedy = "delete it and run \"ltm-export stage ingest\" again";
+        fails(&job.tiles_args(shard), 65, &["photos/", rows, remedy]);
+    }
+    fs::remove_dir_all(job.capture.join("photos")).unwrap();
+    succeeds(&ingest(&source, &job.capture));
+    for shard in ["1/4", "3/4"] {
+        job.tiles(shard);
     }
 }
 
@@ -177,4 +185,41 @@ fn files_of_others_are_not_replaced() {
     let said = succeeds(&ingest(capture, &copy)).stdout;
     assert!(String::from_utf8_lossy(&said).contains(": 1 files written"));
     assert!(fs::read(copy.join("patterns/0004.png")).unwrap() == pattern);
+}
+
+#[test]
+fn tiled_tiffs_of_another_program_have_the_same_codes() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/tiff");
+    let folder = tempfile::TempDir::new().unwrap();
+    for (name, tolerance) in [
+        ("integers.tif", 0.01),
+        ("integers-big-endian.tif", 0.01),
+        ("floats.tif", 0.01),
+        // The numbers have 11 bits.
+        ("half-floats.tif", 16.0),
+    ] {
+        fs::copy(fixtures.join(name), folder.path().join(name)).unwrap();
+        let manifest = serde_json::json!({
+            "version": 1,
+            "camera": {"width": 40, "height": 50, "black": 0, "white": 65535},
+            "light": {"width": 4, "height": 5, "gamma": 1},
+            "correspondence": {"affine": [[0.1, 0, 0], [0, 0.1, 0]]},
+            "dark": name,
+            "shots": [{"pattern": "none.png", "photo": name}],
+        });
+        fs::write(folder.path().join("capture.json"), manifest.to_string()).unwrap();
+        let capture = CaptureFolder::open(folder.path()).unwrap();
+        let extent = capture.manifest().camera.extent();
+        let dark = capture.read_dark(&CameraPixelSet::all(extent)).unwrap();
+        for ((x, y), light) in extent.cells().zip(dark.light()) {
+            for (c, light) in (0..).zip(light) {
+                let code = f64::from(300 * x + 200 * y + 1000 * c);
+                let found = f64::from(*light) * 65_535.0;
+                assert!(
+                    (found - code).abs() < tolerance,
+                    "{name} ({x}, {y}): {found}"
+                );
+            }
+        }
+    }
 }

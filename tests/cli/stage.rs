@@ -148,25 +148,41 @@ fn shards_write_the_bytes_of_one_recovery() {
     let job = Job::new("64x400", &[], &LEARNED);
     let recovered = job.recover(&[]);
     job.plan(&[]);
+    // The limit on memory and the number of threads change no byte.
+    let limits = [("1G", "1"), ("4G", "2"), ("1G", "2"), ("4G", "1")];
+    let limited = |args: &[&str], (memory, threads): (&str, &str)| {
+        let mut command = command(args);
+        command.args(["--memory", memory]);
+        let output = command.env("RAYON_NUM_THREADS", threads).output().unwrap();
+        assert!(output.status.success(), "{}", stderr_text(&output));
+    };
+    let learned = job.stages.join("learned.bin");
+    let what_is_learned = limits.map(|limits| {
+        limited(&["stage", "learn", text(&job.stages)], limits);
+        let bytes = fs::read(&learned).unwrap();
+        fs::remove_file(&learned).unwrap();
+        bytes
+    });
+    assert!({ what_is_learned.windows(2) }.all(|two| two[0] == two[1]));
     job.learn();
-    for order in [&[1][..], &[2, 1], &[3, 1, 2], &[7, 2, 4, 6, 1, 3, 5]] {
+    // One shard at all limits, the others at each in turn.
+    let orders = [&[1][..], &[1], &[1], &[1], &[2, 1], &[3, 1, 2]];
+    for (first, order) in (0..).zip(orders.into_iter().chain([&[7, 2, 4, 6, 1, 3, 5][..]])) {
         let count = order.len();
-        for (i, number) in order.iter().enumerate() {
+        for (number, i) in order.iter().zip(first..) {
             let shard = format!("{number}/{count}");
-            let memory = if i % 2 == 0 { "1G" } else { "4G" };
-            let mut tiles = command(&job.tiles_args(&shard));
-            tiles.args(["--memory", memory]);
-            tiles.env("RAYON_NUM_THREADS", (1 + i % 2).to_string());
-            let output = tiles.output().unwrap();
-            assert!(output.status.success(), "{}", stderr_text(&output));
+            limited(&job.tiles_args(&shard), limits[i % limits.len()]);
         }
         let assembled = job.assemble(count);
         assert!(assembled.0 == recovered.0, "{count} shards");
         assert_eq!(assembled.1, recovered.1);
+        if count == 1 && first < limits.len() - 1 {
+            fs::remove_file(job.pack("1-of-1.pack")).unwrap();
+        }
     }
     // Nothing is done again.
     let written = |path: &Path| fs::metadata(path).unwrap().modified().unwrap();
-    let files = [job.stages.join("learned.bin"), job.pack("2-of-3.pack")];
+    let files = [learned, job.pack("2-of-3.pack")];
     let before = files.each_ref().map(|path| written(path));
     job.plan(&[]);
     for again in [job.learn(), job.tiles("2/3")] {
@@ -293,17 +309,20 @@ fn a_killed_shard_resumes_and_two_at_once_do_no_harm() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(!job.pack("1-of-1.pack").exists());
+    // One of them says that it resumes.
     let args = job.tiles_args("1/1");
     let both = [(); 2].map(|()| {
         let mut command = command(&args);
         command.stdout(Stdio::null()).stderr(Stdio::piped());
         command.spawn().unwrap()
     });
-    for child in both {
+    let said = both.map(|child| {
         let output = child.wait_with_output().unwrap();
         let said = stderr_text(&output);
         assert!(output.status.success(), "{said}");
-    }
+        said
+    });
+    assert!(said.concat().contains("resuming with "));
     let left = fs::read_dir(job.stages.join("shards")).unwrap();
     let left: Vec<_> = left.flatten().map(|entry| entry.file_name()).collect();
     assert_eq!(left, ["1-of-1.pack"]);

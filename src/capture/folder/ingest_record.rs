@@ -1,12 +1,12 @@
 //! The record in a TIFF of `ltm-export stage ingest`: tags of its own, see docs/capture.md.
 //!
-//! The record has a checksum of each strip, so that a strip can be read and checked without the others, and a histogram of all
+//! The record has a checksum of each tile, so that a tile can be read and checked without the others, and a histogram of all
 //! codes, from which their statistics follow for any saturation.
 
 use std::io::{self, Read, Seek, Write};
 
 use serde::{Deserialize, Serialize};
-use tiff::decoder::Decoder;
+use tiff::decoder::{ChunkType, Decoder};
 use tiff::encoder::{DirectoryEncoder, TiffKind};
 use tiff::tags::{Tag, Type, ValueBuffer};
 use tiff::{TiffError, TiffResult};
@@ -16,7 +16,7 @@ use crate::transport::CHANNELS;
 
 /// Number of different codes.
 const CODES: usize = 1 << 16;
-/// JSON text that names the source; the histogram; CRC-32C of each strip and at last of the histogram; CRC-32C of the text and of
+/// JSON text that names the source; the histogram; CRC-32C of each tile and at last of the histogram; CRC-32C of the text and of
 /// these checksums. Numbers from 65000 on are for private use.
 const SOURCE: Tag = Tag::Unknown(65100);
 const HISTOGRAM: Tag = Tag::Unknown(65101);
@@ -40,7 +40,7 @@ pub struct IngestSource {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct IngestRecord {
     pub source: IngestSource,
-    /// CRC-32C of the samples of each strip as little-endian bytes, and at last of the histogram.
+    /// CRC-32C of the samples of each tile as little-endian bytes, without padding, and at last of the histogram.
     pub checksums: Vec<u32>,
     /// CRC-32C of the record, and so of the photograph.
     pub checksum: u32,
@@ -55,7 +55,8 @@ impl IngestRecord {
         };
         let source = decoder.get_tag_ascii_string(SOURCE)?;
         let checksums = decoder.get_tag_u32_vec(CHECKSUMS)?;
-        let is_whole = checksums.len() == decoder.strip_count()? as usize + 1;
+        let is_tiled = decoder.get_chunk_type() == ChunkType::Tile;
+        let is_whole = is_tiled && checksums.len() == decoder.tile_count()? as usize + 1;
         if !is_whole || checksum != record_checksum(&source, &checksums) {
             return Err(damaged());
         }
@@ -89,7 +90,7 @@ impl IngestRecord {
         }
     }
 
-    /// Writes the tags of a photograph from `source`, with these `checksums` of its strips.
+    /// Writes the tags of a photograph from `source`, with these `checksums` of its tiles.
     pub fn write<W: Write + Seek, K: TiffKind>(
         encoder: &mut DirectoryEncoder<'_, W, K>,
         source: &IngestSource,

@@ -21,6 +21,8 @@ mod picture_tiff;
 #[cfg(not(target_arch = "wasm32"))]
 mod tiff_layout;
 #[cfg(not(target_arch = "wasm32"))]
+mod tiled_tiff;
+#[cfg(not(target_arch = "wasm32"))]
 mod truth;
 
 use std::io::Read;

@@ -2,6 +2,7 @@
 
 #[cfg(not(target_arch = "wasm32"))]
 use std::io::Read;
+use std::ops::Range;
 
 use super::files::CaptureFiles;
 use super::picture_file::PictureFile;
@@ -25,12 +26,12 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
     /// Opens a photograph by the format that its first bytes say.
     pub fn open(file: PictureFile<'a, F>) -> Result<Self, CaptureError> {
         #[cfg(not(target_arch = "wasm32"))]
-        return Self::open_within(file, picture_tiff::MAX_STRIP_BYTES);
+        return Self::open_within(file, picture_tiff::MAX_ROWS_BYTES);
         #[cfg(target_arch = "wasm32")]
         Ok(Self::Png(Box::new(PngRowReader::open(file)?)))
     }
 
-    /// The same, with strips of a TIFF that take `max_bytes` at most.
+    /// The same, with strips or rows of tiles of a TIFF that take `max_bytes` at most.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn open_within(file: PictureFile<'a, F>, max_bytes: usize) -> Result<Self, CaptureError> {
         let mut start = Vec::new();
@@ -52,22 +53,43 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
 
     /// The codes of the next row; `None` after the last.
     pub fn next(&mut self) -> Result<Option<&[[u16; CHANNELS]]>, CaptureError> {
-        match self {
-            Self::Png(reader) => reader.next(),
-            #[cfg(not(target_arch = "wasm32"))]
-            Self::Tiff(reader) => reader.next(),
-        }
+        let width = self.extent().width;
+        self.next_columns(std::iter::once(0..width))
     }
 
-    /// Makes row `y`, which must not lie above, the next one without reading those between, in a file whose record has the
-    /// statistics of all codes. False in other files, whose rows must all be read.
+    /// The same, of which those outside of `columns` may be wrong in a TIFF.
     #[cfg_attr(
         target_arch = "wasm32",
         expect(unused_variables, reason = "of TIFF only")
     )]
-    pub fn skip_to(&mut self, y: u32) -> bool {
+    pub fn next_columns(
+        &mut self,
+        columns: impl Iterator<Item = Range<u32>>,
+    ) -> Result<Option<&[[u16; CHANNELS]]>, CaptureError> {
+        match self {
+            Self::Png(reader) => reader.next(),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Tiff(reader) => reader.next(columns),
+        }
+    }
+
+    /// Whether the file has a record with the statistics of all codes. Rows of other files must all be read.
+    pub fn is_recorded(&self) -> bool {
         match self {
             Self::Png(_) => false,
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Tiff(reader) => reader.is_recorded(),
+        }
+    }
+
+    /// Makes row `y` of a file with a record, which must not lie above, the next one without reading those between.
+    #[cfg_attr(
+        target_arch = "wasm32",
+        expect(unused_variables, reason = "of TIFF only")
+    )]
+    pub fn skip_to(&mut self, y: u32) {
+        match self {
+            Self::Png(_) => {}
             #[cfg(not(target_arch = "wasm32"))]
             Self::Tiff(reader) => reader.skip_to(y),
         }

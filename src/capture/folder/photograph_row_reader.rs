@@ -17,7 +17,7 @@ pub struct PhotographRowReader<'a, F: CaptureFiles = DiskFiles> {
     pub(super) exposure: f64,
     pub(super) codes: PhotographCodes<'a, F>,
     pub(super) next_row: u32,
-    /// Of the rows that were read.
+    /// Of the rows that were read, unless the file has a record of all.
     pub(super) statistics: CodeStatistics,
 }
 
@@ -86,22 +86,24 @@ impl<F: CaptureFiles> PhotographRowReader<'_, F> {
         mut add: impl FnMut(u32, &[[u16; CHANNELS]]),
     ) -> Result<(), CaptureError> {
         let saturated_from = self.camera.saturated_from();
-        let statistics = &mut self.statistics;
+        let (statistics, is_recorded) = (&mut self.statistics, self.codes.is_recorded());
         read_rows(
             &mut self.codes,
             &mut self.next_row,
             end,
             pixels,
             |y, row| {
-                statistics.add_row(row, saturated_from);
+                if !is_recorded {
+                    statistics.add_row(row, saturated_from);
+                }
                 add(y, row);
             },
         )
     }
 }
 
-/// Reads the rows from `next_row` to `end`, or those of them that have `pixels` where others can be skipped, and calls `add`
-/// with the number and the codes of each.
+/// Reads the rows from `next_row` to `end`, and calls `add` with the number and the codes of each. Of a photograph with a record,
+/// only `pixels` are read, and their rows.
 pub(super) fn read_rows<F: CaptureFiles>(
     codes: &mut PhotographCodes<'_, F>,
     next_row: &mut u32,
@@ -109,13 +111,20 @@ pub(super) fn read_rows<F: CaptureFiles>(
     pixels: &CameraPixelSet,
     mut add: impl FnMut(u32, &[[u16; CHANNELS]]),
 ) -> Result<(), CaptureError> {
+    let is_recorded = codes.is_recorded();
     while *next_row < end {
-        let wanted = pixels.rows().first_from(*next_row).unwrap_or(end);
-        if wanted > *next_row && codes.skip_to(wanted) {
-            *next_row = wanted;
-            continue;
+        if is_recorded {
+            *next_row = pixels.rows().first_from(*next_row).unwrap_or(end);
+            if *next_row >= end {
+                break;
+            }
+            codes.skip_to(*next_row);
         }
-        let Some(row) = codes.next()? else {
+        let row = match is_recorded {
+            true => codes.next_columns(pixels.spans_of(*next_row))?,
+            false => codes.next()?,
+        };
+        let Some(row) = row else {
             break;
         };
         add(*next_row, row);

@@ -1,6 +1,8 @@
-//! TIFF photographs: linear RGB of 16-bit integers or floating-point numbers, in strips. With the record of [`IngestRecord`], rows are read without the others.
+//! TIFF photographs: linear RGB of 16-bit integers or floating-point numbers, in strips or tiles. With the record of
+//! [`IngestRecord`], tiles are read without the others.
 
 use std::io::BufReader;
+use std::ops::Range;
 
 use tiff::TiffError;
 use tiff::decoder::{Decoder, Limits};
@@ -10,31 +12,43 @@ use super::ingest_record::IngestRecord;
 use super::picture_file::PictureFile;
 use super::tiff_layout::{Layout, SampleType};
 use crate::capture::code_statistics::CodeStatistics;
-use crate::capture::error::CaptureError;
+use crate::capture::error::{CaptureError, CaptureErrorKind};
 use crate::transport::{CHANNELS, Extent};
 
 /// Bytes that are read from a file at a time.
 const READ_BYTES: usize = 1 << 16;
-/// Bytes that are read for a tag: uncompressed strips do not go through the buffer.
+/// Bytes that are read for a tag: uncompressed tiles do not go through the buffer.
 pub(super) const TAG_BYTES: usize = 1 << 10;
-/// Largest strip that is read: as many are in memory as photographs are read at once.
-pub(super) const MAX_STRIP_BYTES: usize = 8 << 20;
+/// Largest strip, or tiles side by side, of more than [`TILE_ROWS`](super::tiled_tiff::TILE_ROWS) rows: as many are in memory as
+/// photographs are read at once.
+pub(super) const MAX_ROWS_BYTES: usize = 8 << 20;
 
 /// The first picture of a TIFF, row by row from the top.
 pub(super) struct TiffRowReader<'a, F: CaptureFiles> {
     file: PictureFile<'a, F>,
     decoder: Decoder<BufReader<CaptureFile<'a, F>>>,
     extent: Extent,
-    strip_rows: u32,
+    /// Columns and rows of a strip or a tile.
+    chunk: Extent,
     sample_type: SampleType,
     record: Option<IngestRecord>,
-    /// The strip that was read last, until it is released.
-    strip: Option<(u32, Vec<[u16; CHANNELS]>)>,
+    /// What was read last, until it is released.
+    read: Option<ChunkRow>,
     next_row: u32,
 }
 
+/// The rows of a strip, or of tiles that lie side by side.
+struct ChunkRow {
+    /// Number of these rows from the top.
+    index: u32,
+    /// `[rows, width]`, valid in the chunks that are read.
+    codes: Vec<[u16; CHANNELS]>,
+    /// Whether each chunk is read, from left to right.
+    is_read: Vec<bool>,
+}
+
 impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
-    /// Opens a TIFF whose strips take `max_bytes` at most.
+    /// Opens a TIFF whose strips or rows of tiles take `max_bytes` at most.
     pub fn open_within(file: PictureFile<'a, F>, max_bytes: usize) -> Result<Self, CaptureError> {
         let source = BufReader::with_capacity(TAG_BYTES, file.open()?);
         let mut decoder = Decoder::new(source).map_err(|e| unreadable(&file, e))?;
@@ -50,16 +64,16 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
             let source = BufReader::with_capacity(READ_BYTES, file.open()?);
             decoder = Decoder::new(source).map_err(|e| unreadable(&file, e))?;
         }
-        // Refuses strips whose compressed size is more than twice the largest decoded one.
+        // Refuses strips and tiles whose compressed size is much more than the largest decoded one.
         let mut limits = Limits::default();
         limits.intermediate_buffer_size = limits.intermediate_buffer_size.max(2 * max_bytes);
         decoder = decoder.with_limits(limits);
         Ok(Self {
             extent: layout.extent,
-            strip_rows: layout.strip_rows,
+            chunk: layout.chunk,
             sample_type,
             record,
-            strip: None,
+            read: None,
             next_row: 0,
             decoder,
             file,
@@ -70,71 +84,122 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
         self.extent
     }
 
-    /// The codes of the next row; `None` after the last.
-    pub fn next(&mut self) -> Result<Option<&[[u16; CHANNELS]]>, CaptureError> {
+    /// The codes of the next row, of which those outside of `columns` may be wrong; `None` after the last.
+    pub fn next(
+        &mut self,
+        columns: impl Iterator<Item = Range<u32>>,
+    ) -> Result<Option<&[[u16; CHANNELS]]>, CaptureError> {
         if self.next_row >= self.extent.height {
             return Ok(None);
         }
-        let (i, row) = (
-            self.next_row / self.strip_rows,
-            self.next_row % self.strip_rows,
+        let (index, row) = (
+            self.next_row / self.chunk.height,
+            self.next_row % self.chunk.height,
         );
-        if self.strip.as_ref().is_none_or(|(read, _)| *read != i) {
-            self.read_strip(i)?;
+        let width = self.extent.width as usize;
+        let mut read = match self.read.take() {
+            Some(read) if read.index == index => read,
+            last => self.start_rows(index, last),
+        };
+        for columns in columns.filter(|columns| !columns.is_empty()) {
+            for i in columns.start / self.chunk.width..=(columns.end - 1) / self.chunk.width {
+                if !read.is_read[i as usize] {
+                    self.read_chunk(i, &mut read)?;
+                    read.is_read[i as usize] = true;
+                }
+            }
         }
         self.next_row += 1;
-        let width = self.extent.width as usize;
-        let strip = self
-            .strip
-            .iter()
-            .flat_map(|(_, strip)| strip.chunks_exact(width));
-        Ok({ strip }.nth(row as usize))
+        let rows = self.read.insert(read).codes.chunks_exact(width);
+        Ok({ rows }.nth(row as usize))
     }
 
-    fn read_strip(&mut self, i: u32) -> Result<(), CaptureError> {
-        // Strips have equal sizes, so the memory of the last is enough.
-        let mut strip = self.strip.take().map_or(Vec::new(), |(_, strip)| strip);
-        let first = i * self.strip_rows;
-        let rows = self.strip_rows.min(self.extent.height - first);
-        strip.resize(Extent::new(self.extent.width, rows).area(), [0; CHANNELS]);
-        let codes = strip.as_flattened_mut();
+    /// The rows of number `index`, of which nothing is read, in the memory of the `last`.
+    fn start_rows(&self, index: u32, last: Option<ChunkRow>) -> ChunkRow {
+        let (mut codes, mut is_read) =
+            last.map_or_else(Default::default, |last| (last.codes, last.is_read));
+        let rows = self.row_range(index).len();
+        codes.resize(self.extent.width as usize * rows, [0; CHANNELS]);
+        is_read.clear();
+        is_read.resize(self.chunks_across() as usize, false);
+        ChunkRow {
+            index,
+            codes,
+            is_read,
+        }
+    }
+
+    fn chunks_across(&self) -> u32 {
+        self.extent.width.div_ceil(self.chunk.width)
+    }
+
+    /// The rows of the photograph that the chunks of number `index` from the top have.
+    fn row_range(&self, index: u32) -> Range<u32> {
+        let first = index * self.chunk.height;
+        first..self.extent.height.min(first + self.chunk.height)
+    }
+
+    /// Reads the chunk of number `i` from the left into `read`.
+    fn read_chunk(&mut self, i: u32, read: &mut ChunkRow) -> Result<(), CaptureError> {
+        let number = read.index * self.chunks_across() + i;
+        let rows = self.row_range(read.index);
+        let first = i * self.chunk.width;
+        let columns = first..self.extent.width.min(first + self.chunk.width);
+        let is_whole = columns.len() == self.extent.width as usize;
+        let mut own = Vec::new();
+        let codes = match is_whole {
+            true => read.codes.as_flattened_mut(),
+            false => {
+                own.resize(columns.len() * rows.len(), [0; CHANNELS]);
+                own.as_flattened_mut()
+            }
+        };
+        let place = || {
+            let rows = format!("rows {} to {}", rows.start, rows.end - 1);
+            match is_whole {
+                true => rows,
+                false => format!("{rows}, columns {} to {}", columns.start, columns.end - 1),
+            }
+        };
         if self.sample_type == SampleType::U16 {
-            let read = self
-                .decoder
-                .read_chunk_bytes(i, bytemuck::cast_slice_mut(codes));
-            read.map_err(|e| unreadable(&self.file, e))?;
+            let bytes = bytemuck::cast_slice_mut(codes);
+            let done = self.decoder.read_chunk_bytes(number, bytes);
+            done.map_err(|e| unreadable(&self.file, e))?;
         } else {
             let mut bytes = vec![0; codes.len() * self.sample_type.bytes()];
-            let read = self.decoder.read_chunk_bytes(i, &mut bytes);
-            read.map_err(|e| unreadable(&self.file, e))?;
+            let done = self.decoder.read_chunk_bytes(number, &mut bytes);
+            done.map_err(|e| unreadable(&self.file, e))?;
             if self.sample_type.codes(&bytes, codes).is_none() {
-                let last = first + rows - 1;
-                let reason = format!("rows {first} to {last} have a sample that is not a number");
+                let reason = format!("there is a sample that is not a number in {}", place());
                 return Err(self.file.unreadable("TIFF", reason));
             }
         }
         if let Some(record) = &self.record {
             let checksum = crc32c::crc32c(bytemuck::cast_slice(codes));
-            if record.checksums.get(i as usize) != Some(&checksum) {
-                let last = first + rows - 1;
-                let reason = format!("the checksum of rows {first} to {last} is wrong");
-                return Err(self.file.unreadable("TIFF", reason));
+            if record.checksums.get(number as usize) != Some(&checksum) {
+                return Err(self.file.error(CaptureErrorKind::WrongChecksum(place())));
             }
         }
-        self.strip = Some((i, strip));
+        let width = self.extent.width as usize;
+        let parts = { own.chunks_exact(columns.len()) }.zip(read.codes.chunks_exact_mut(width));
+        for (part, row) in parts {
+            row[columns.start as usize..columns.end as usize].copy_from_slice(part);
+        }
         Ok(())
     }
 
-    /// See [`PhotographCodes::skip_to`](super::photograph_codes::PhotographCodes::skip_to).
-    pub fn skip_to(&mut self, y: u32) -> bool {
-        if self.record.is_some() {
-            self.next_row = y;
-        }
+    /// Whether the file has a record.
+    pub fn is_recorded(&self) -> bool {
         self.record.is_some()
     }
 
+    /// Makes row `y` the next one.
+    pub fn skip_to(&mut self, y: u32) {
+        self.next_row = y;
+    }
+
     pub fn release(&mut self) {
-        self.strip = None;
+        self.read = None;
     }
 
     /// The statistics by the record, if there is one.
@@ -176,13 +241,13 @@ mod tests {
     use crate::capture::IngestSource;
     use crate::capture::camera_pixel_set::CameraPixelSet;
     use crate::capture::camera_row_set::CameraRowSet;
-    use crate::capture::error::CaptureErrorKind;
     use crate::capture::{CaptureFolder, Manifest};
+    use crate::transport::TileRect;
 
     const WIDTH: u32 = 20;
     const HEIGHT: u32 = 300;
-    /// Where strips begin: after the header and the resolution.
-    const STRIPS_START: usize = 24;
+    /// Where tiles begin: after the header and the values of tags that are known before.
+    const TILES_START: usize = 36;
 
     /// Files in memory that count the bytes that are read.
     #[derive(Clone, Default)]
@@ -212,8 +277,12 @@ mod tests {
     }
 
     fn codes() -> Vec<u16> {
+        codes_of(Extent::new(WIDTH, HEIGHT))
+    }
+
+    fn codes_of(extent: Extent) -> Vec<u16> {
         let code = |i: u32| (i.wrapping_mul(2_654_435_761) >> 17) as u16;
-        (0..WIDTH * HEIGHT * 3).map(code).collect()
+        (0..extent.area() as u32 * 3).map(code).collect()
     }
 
     fn tiff<C: ColorType>(
@@ -249,13 +318,17 @@ mod tests {
 
     /// A capture whose dark frame is the photograph `name` with these bytes.
     fn capture(name: &str, bytes: Vec<u8>) -> CaptureFolder<CountedFiles> {
+        capture_of(Extent::new(WIDTH, HEIGHT), name, bytes)
+    }
+
+    fn capture_of(extent: Extent, name: &str, bytes: Vec<u8>) -> CaptureFolder<CountedFiles> {
         let mut manifest = Manifest {
             version: 1,
             dark: Some(name.to_owned()),
             shots: vec![Default::default()],
             ..Manifest::default()
         };
-        (manifest.camera.width, manifest.camera.height) = (WIDTH, HEIGHT);
+        (manifest.camera.width, manifest.camera.height) = (extent.width, extent.height);
         (manifest.light.width, manifest.light.height) = (1, 1);
         (manifest.light.gamma, manifest.camera.white) = (Some(1.0), 30_000.0);
         manifest.shots[0].photo = name.to_owned();
@@ -289,7 +362,7 @@ mod tests {
     }
 
     fn read_all(capture: &CaptureFolder<CountedFiles>) -> (Vec<[u32; CHANNELS]>, CodeStatistics) {
-        let dark = capture.read_dark(&CameraPixelSet::row_range(0..HEIGHT, WIDTH));
+        let dark = capture.read_dark(&CameraPixelSet::all(capture.manifest().camera.extent()));
         let shot = capture.open_shot(0).unwrap();
         let (photo, statistics) = shot.read_all(&dark.unwrap()).unwrap();
         (bits(&photo), statistics)
@@ -358,7 +431,7 @@ mod tests {
         let rows = CameraPixelSet::row_range(16..32, WIDTH);
         let said = float.read_dark(&rows).map(drop).unwrap_err().to_string();
         assert!(
-            said.contains("rows 16 to 31 have a sample that is not a number"),
+            said.contains("there is a sample that is not a number in rows 16 to 31"),
             "{said}"
         );
     }
@@ -394,16 +467,89 @@ mod tests {
         let own: Vec<_> = own.copied().collect();
         assert_eq!(bits(&photo), own);
         assert_eq!(found, statistics);
-        // Strips of 16 rows: 0 to 31, 96 to 143 with 112 to 127 twice, 288 to 299; and the record.
+        // Tiles of 16 rows and 32 columns: 0 to 31, 96 to 143, 288 to 299; and the record.
         let record = ingested.files.files["a.tif"].len() - codes().len() * 2;
-        let strips = (32 + 64 + 12) * width * 6;
+        let tiles = (32 + 48 + 12) * 32 * 6;
         assert!(
-            (strips..strips + record + (8 << 10)).contains(&bytes),
+            (tiles..tiles + record + (8 << 10)).contains(&bytes),
             "{bytes}"
         );
         let (photo, found, bytes) = read(&whole);
         assert_eq!((bits(&photo), found), (own, statistics));
         assert!(bytes > codes().len() * 2);
+    }
+
+    #[test]
+    fn tiles_of_an_ingested_photograph_are_read_without_the_others() {
+        // Three tiles of 704 columns with padding, three of 16 rows.
+        let extent = Extent::new(2100, 48);
+        let tile_bytes = 704 * 16 * 6;
+        let codes = codes_of(extent);
+        let whole = capture_of(extent, "a.tif", {
+            let mut file = Cursor::new(Vec::new());
+            let mut encoder = TiffEncoder::new(&mut file).unwrap();
+            let image = encoder.new_image::<RGB16>(extent.width, extent.height);
+            let mut image = image.unwrap();
+            image.rows_per_strip(9).unwrap();
+            image.write_data(&codes).unwrap();
+            file.into_inner()
+        });
+        let bytes = ingested(&whole);
+        let tiled = capture_of(extent, "a.tif", bytes.clone());
+        let expected = read_all(&whole);
+        assert!(read_all(&tiled) == expected);
+        // Without the record: any tiled TIFF.
+        let record = { bytes.windows(2) }.rposition(|tag| tag == 65103u16.to_le_bytes());
+        let mut common = bytes.clone();
+        common[record.unwrap()] ^= 4; // no tag of ours
+        let common = capture_of(extent, "a.tif", common);
+        assert!(read_all(&common) == expected);
+        let rect = |x, y, width, height| TileRect {
+            x,
+            y,
+            extent: Extent::new(width, height),
+        };
+        for (rects, tiles) in [
+            (vec![rect(5, 3, 20, 9)], 1),
+            (vec![rect(700, 14, 8, 4)], 4),
+            (vec![rect(2090, 35, 10, 5)], 1),
+            (vec![rect(5, 0, 8, 20), rect(2090, 2, 10, 5)], 3),
+            (vec![rect(0, 17, 2100, 2)], 3),
+            (Vec::new(), 0),
+        ] {
+            let pixels = CameraPixelSet::union(extent, &rects);
+            let own = { pixels.rects() }.flat_map(TileRect::pixels);
+            let own: Vec<_> = own.map(|pixel| expected.0[extent.index(pixel)]).collect();
+            for (capture, is_recorded) in [(&tiled, true), (&common, false)] {
+                let dark = capture.read_dark(&pixels).unwrap();
+                let before = capture.files.bytes.get();
+                let mut photo = Vec::new();
+                let mut reader = capture.open_shot(0).unwrap();
+                reader.read(&pixels, &dark, &mut photo).unwrap();
+                assert_eq!(bits(&photo), own);
+                assert_eq!(reader.finish().unwrap(), expected.1);
+                let read = (capture.files.bytes.get() - before) / tile_bytes;
+                // Through a buffer without a record.
+                let is_right = if is_recorded {
+                    read == tiles
+                } else {
+                    read >= 9
+                };
+                assert!(is_right, "{read} {rects:?}");
+            }
+        }
+        // Row 16, column 704: the second tile of the second row.
+        let mut damaged = bytes;
+        damaged[TILES_START + 4 * tile_bytes] ^= 1;
+        let damaged = capture_of(extent, "a.tif", damaged);
+        let pixels = |x| CameraPixelSet::union(extent, &[rect(x, 20, 4, 4)]);
+        assert!(damaged.read_dark(&pixels(700)).is_ok());
+        let said = damaged.read_dark(&pixels(701)).map(drop).unwrap_err();
+        let said = said.to_string();
+        assert!(
+            said.contains("has a wrong checksum in rows 16 to 31, columns 704 to 1407"),
+            "{said}"
+        );
     }
 
     #[test]
@@ -422,11 +568,11 @@ mod tests {
             bytes[at] ^= 1;
             fault(bytes)
         };
-        let row_bytes = WIDTH as usize * 6;
-        assert_eq!(damaged(STRIPS_START + 15 * row_bytes), Ok(()));
-        let said = damaged(STRIPS_START + 16 * row_bytes).unwrap_err();
+        let row_bytes = 32 * 6;
+        assert_eq!(damaged(TILES_START + 15 * row_bytes), Ok(()));
+        let said = damaged(TILES_START + 16 * row_bytes).unwrap_err();
         assert!(
-            said.contains("the checksum of rows 16 to 31 is wrong"),
+            said.contains("has a wrong checksum in rows 16 to 31"),
             "{said}"
         );
         let said = fault(whole[..whole.len() / 2].to_vec()).unwrap_err();

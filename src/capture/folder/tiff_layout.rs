@@ -3,10 +3,11 @@
 use std::io::{Read, Seek};
 
 use half::f16;
-use tiff::decoder::{ChunkType, Decoder};
+use tiff::decoder::Decoder;
 use tiff::tags::{PlanarConfiguration, SampleFormat, Tag};
 use tiff::{ColorType, TiffResult};
 
+use super::tiled_tiff::TILE_ROWS;
 use crate::capture::error::CaptureErrorKind;
 use crate::transport::{CHANNELS, Extent};
 
@@ -63,27 +64,27 @@ fn float_code(sample: f32) -> Option<u16> {
 /// How the samples of a TIFF are arranged.
 pub(super) struct Layout {
     pub extent: Extent,
-    /// Rows of a strip.
-    pub strip_rows: u32,
+    /// Columns, with padding, and rows of a strip or a tile.
+    pub chunk: Extent,
     color: ColorType,
     /// Samples of a pixel, with those that are no colour.
     samples_per_pixel: u16,
     /// The number of [`Tag::SampleFormat`], if all samples have one.
     format: Option<u16>,
-    is_tiled: bool,
     is_planar: bool,
 }
 
 impl Layout {
     pub fn read(decoder: &mut Decoder<impl Read + Seek>) -> TiffResult<Self> {
         let (width, height) = decoder.dimensions()?;
+        let (chunk_width, chunk_height) = decoder.chunk_dimensions();
         let formats: Option<Vec<u16>> = decoder.find_tag_unsigned_vec(Tag::SampleFormat)?;
         let planes: Option<u16> = decoder.find_tag_unsigned(Tag::PlanarConfiguration)?;
         let formats = formats.unwrap_or_default();
         let first = *formats.first().unwrap_or(&SampleFormat::Uint.to_u16());
         Ok(Self {
             extent: Extent::new(width, height),
-            strip_rows: decoder.chunk_dimensions().1.min(height).max(1),
+            chunk: Extent::new(chunk_width.max(1), chunk_height.min(height).max(1)),
             color: decoder.colortype()?,
             samples_per_pixel: decoder
                 .find_tag_unsigned(Tag::SamplesPerPixel)?
@@ -92,13 +93,13 @@ impl Layout {
                 .iter()
                 .all(|format| *format == first)
                 .then_some(first),
-            is_tiled: decoder.get_chunk_type() == ChunkType::Tile,
             is_planar: planes == Some(PlanarConfiguration::Planar.to_u16()),
         })
     }
 
-    /// The type of the samples, if photographs may be stored so, in strips of at most `max_strip_bytes`.
-    pub fn sample_type(&self, max_strip_bytes: usize) -> Result<SampleType, CaptureErrorKind> {
+    /// The type of the samples, if photographs may be stored so, in strips or rows of tiles of at most `max_bytes`, or tiles of
+    /// at most [`TILE_ROWS`] rows.
+    pub fn sample_type(&self, max_bytes: usize) -> Result<SampleType, CaptureErrorKind> {
         const INTEGER: u16 = SampleFormat::Uint.to_u16();
         const FLOAT: u16 = SampleFormat::IEEEFP.to_u16();
         let sample_type = match (self.color, self.format) {
@@ -113,16 +114,17 @@ impl Layout {
             let found = format!("{name} with {count} samples a pixel");
             return Err(CaptureErrorKind::PhotoType(found));
         }
-        if self.is_tiled {
-            return Err(CaptureErrorKind::NotInStrips("is tiled"));
-        }
         if self.is_planar {
-            return Err(CaptureErrorKind::NotInStrips("has planes of one channel"));
+            return Err(CaptureErrorKind::Planar);
         }
-        let row_bytes = (CHANNELS * sample_type.bytes()) as u64 * u64::from(self.extent.width);
-        match row_bytes.saturating_mul(self.strip_rows.into()) <= max_strip_bytes as u64 {
+        let pixel_bytes = (CHANNELS * sample_type.bytes()) as u64;
+        let chunk_bytes = pixel_bytes.saturating_mul(self.chunk.area() as u64);
+        let chunks = u64::from(self.extent.width.div_ceil(self.chunk.width));
+        // On a few threads, they take less than the rows that the memory plan counts for all photographs.
+        let are_few = self.chunk.height <= TILE_ROWS && chunk_bytes <= max_bytes as u64;
+        match are_few || chunk_bytes.saturating_mul(chunks) <= max_bytes as u64 {
             true => Ok(sample_type),
-            false => Err(CaptureErrorKind::LargeStrips(self.strip_rows)),
+            false => Err(CaptureErrorKind::LargeStrips(self.chunk.height)),
         }
     }
 
@@ -154,17 +156,28 @@ mod tests {
     fn strips_are_bounded() {
         let mut large = Layout {
             extent: Extent::new(60_000, 60_000),
-            strip_rows: 60_000,
+            chunk: Extent::new(60_000, 60_000),
             color: ColorType::RGB(16),
             samples_per_pixel: 3,
             format: Some(SampleFormat::Uint.to_u16()),
-            is_tiled: false,
             is_planar: false,
         };
         let error = large.sample_type(8 << 20).unwrap_err();
         assert!(matches!(error, CaptureErrorKind::LargeStrips(60_000)));
-        large.strip_rows = 20;
+        large.chunk.height = 20;
         assert_eq!(large.sample_type(8 << 20).unwrap(), SampleType::U16);
+        // Tiles of a row count together, unless they are flat.
+        for (tile, is_read) in [
+            (Extent::new(64, 20), true),
+            (Extent::new(64, 32), false),
+            (Extent::new(1 << 20, 20), false),
+            (Extent::new(1 << 20, 16), false),
+            (Extent::new(1 << 14, 16), true),
+        ] {
+            large.chunk = tile;
+            assert_eq!(large.sample_type(8 << 20).is_ok(), is_read, "{tile:?}");
+        }
+        large.chunk = Extent::new(60_000, 20);
         // Twice as large, by its samples.
         (large.color, large.format) = (ColorType::RGB(32), Some(SampleFormat::IEEEFP.to_u16()));
         assert_eq!(large.sample_type(16 << 20).unwrap(), SampleType::F32);

@@ -153,12 +153,14 @@ fn code(problem: &CaptureErrorKind) -> &'static str {
         | Kind::NotInvertible
         | Kind::DisplacementOfOtherPicture => "manifest-field",
         Kind::Missing => "file-missing",
-        Kind::Io(_) | Kind::Unreadable(..) | Kind::InvalidTruth(_) => "file-unreadable",
+        Kind::Io(_) | Kind::Unreadable(..) | Kind::WrongChecksum(_) | Kind::InvalidTruth(_) => {
+            "file-unreadable"
+        }
         Kind::WrongExtent { .. } => "file-size",
         Kind::PhotoType(_)
         | Kind::PatternType(_)
         | Kind::Interlaced
-        | Kind::NotInStrips(_)
+        | Kind::Planar
         | Kind::LargeStrips(_) => "file-type",
         Kind::MissingGrayCode { .. } => "gray-code-incomplete",
     }

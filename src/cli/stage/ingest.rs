@@ -1,4 +1,4 @@
-//! `ltm-export stage ingest`: copies a capture. The photographs of the copy are TIFFs, whose rows can be read one by one.
+//! `ltm-export stage ingest`: copies a capture. The photographs of the copy are TIFFs, whose tiles can be read one by one.
 //!
 //! A shard writes every Nth file; the shard that ends last writes the manifest.
 

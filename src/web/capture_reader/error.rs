@@ -11,9 +11,11 @@ impl From<CaptureError> for CodedError {
         let code = match &error.problem {
             // The manifest itself.
             Kind::Io(_) if error.field.is_none() => "capture-manifest",
-            Kind::Missing | Kind::Io(_) | Kind::Unreadable(..) => "capture-file",
+            Kind::Missing | Kind::Io(_) | Kind::Unreadable(..) | Kind::WrongChecksum(_) => {
+                "capture-file"
+            }
             Kind::WrongExtent { .. } => "capture-size",
-            Kind::PhotoType(_) | Kind::Interlaced | Kind::NotInStrips(_) | Kind::LargeStrips(_) => {
+            Kind::PhotoType(_) | Kind::Interlaced | Kind::Planar | Kind::LargeStrips(_) => {
                 "capture-photograph"
             }
             Kind::PatternType(_) => "capture-pattern",
