@@ -1,7 +1,7 @@
 """Measures how much faster two cores recover a large capture in shards than one core, and what a cluster would take.
 
 python3 cluster.py [CAPTURE] [--program ltm-export] [--side 1024] [--repeat 2] [--patterns 80] [--shards 16]
-                   [--report FILE.json]
+                   [--slurm] [--report FILE.json]
 
 CAPTURE is a capture folder; without it, one of `--side` pixels is simulated and repeated so often along each axis, with
 its light. It is recovered on one core:
@@ -9,13 +9,16 @@ its light. It is recovered on one core:
   recover      the peer: one process
   one core     pkg-scripts/cluster --cores 1
 
-and then by pkg-scripts/cluster --cores 2. All three files must have the same bytes. The times of the workflow's jobs on
-one core are the input of a discrete-event simulation of a queue, which starts the jobs of each stage on free cores in
-order. Its prediction for two cores is to be compared with the measurement. For 100 and 1,000 cores, and a capture of
-16,384 x 16,384 pixels, there is none. Needs Python 3.11, numpy and OpenCV, and a machine that does nothing else.
+and then by pkg-scripts/cluster --cores 2; with --slurm also on a Slurm of two nodes of one core each, which the
+benchmark sets up on this machine, as root, from Debian's packages. All files must have the same bytes. The times of the
+workflow's jobs on one core are the input of a discrete-event simulation of a queue, which starts the jobs of each stage
+on free cores in order. Its prediction for two cores is to be compared with the measurement. For 100 and 1,000 cores,
+and a capture of 16,384 x 16,384 pixels, there is none. Needs Python 3.11, numpy and OpenCV, and a machine that does
+nothing else.
 """
 
 import argparse
+import contextlib
 import hashlib
 import heapq
 import json
@@ -30,6 +33,15 @@ import cv2
 import numpy
 
 REPO = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(REPO / "tests/cluster"))
+from two_node_slurm import TwoNodeSlurm  # noqa: E402
+
+# Options for that Slurm, which keeps no accounting and whose nodes have 4 GB.
+SLURM = ["--profile", REPO / "workflow/profiles/slurm", "--default-resources", "slurm_partition=main"]
+SLURM += ["--slurm-no-account", "--slurm-status-command", "squeue"]
+SLURM += ["--slurm-init-seconds-before-status-checks", "3", "--seconds-between-status-checks", "3"]
+SLURM += ["--latency-wait", "20"]
+SLURM += ["--config", "memory_mb=3000"]
 # Stages in the order in which they run; the jobs of one run side by side.
 STAGES = ("ingest", "plan", "learn", "tiles", "levels", "assemble")
 # Those that are divided into as many jobs as there are shards.
@@ -58,8 +70,15 @@ def main():
         folder = Path(temporary)
         capture = args.capture or repeated_capture(args, folder)
         extent = json.loads((capture / "capture.json").read_text(encoding="utf-8"))["camera"]
-        peer, expected = recover(args.program, capture, folder)
-        report = {"recover_s": peer, "shards": args.shards}
+        report = {"shards": args.shards}
+        if args.slurm:
+            # First, as it may be unavailable.
+            with contextlib.closing(TwoNodeSlurm(folder / "slurm")) as slurm:
+                slurm.start()
+                report["workflow_slurm_s"], on_slurm, _ = run_workflow(args, capture, folder / "on-slurm", 2, SLURM)
+        report["recover_s"], expected = recover(args.program, capture, folder)
+        if args.slurm and on_slurm != expected:
+            sys.exit("the file of Slurm is another than that of recover")
         for cores in (1, 2):
             seconds, file, times = run_workflow(args, capture, folder / f"{cores}-cores", cores)
             if file != expected:
@@ -89,6 +108,7 @@ def parse_arguments():
     parser.add_argument("--repeat", type=int, default=2, help="how often it is repeated along each axis")
     parser.add_argument("--patterns", type=int, default=80)
     parser.add_argument("--shards", type=int, default=16)
+    parser.add_argument("--slurm", action="store_true", help="measure on a Slurm of two nodes, too")
     parser.add_argument("--report", type=Path, help="JSON file to write")
     return parser.parse_args()
 
@@ -122,15 +142,18 @@ def recover(program, capture, folder):
     return seconds, hash_of(file)
 
 
-def run_workflow(args, capture, folder, cores):
-    """The seconds of the workflow, the hash of the file, and the seconds of its jobs by stage."""
+def run_workflow(args, capture, folder, cores, engine=None):
+    """The seconds of the workflow, the hash of the file, and the seconds of its jobs by stage.
+
+    Without options for another `engine`, it runs on this machine.
+    """
     captures, results = folder / "captures", folder / "results"
     captures.mkdir(parents=True)
     (captures / "large").symlink_to(capture.resolve())
     recorder, times = folder / "ltm-export", folder / "times"
     recorder.write_text(RECORDER.format(program=args.program.resolve(), times=times), encoding="utf-8")
     recorder.chmod(0o755)
-    command = [REPO / "pkg-scripts/cluster", captures, "-o", results, "--cores", str(cores)]
+    command = [REPO / "pkg-scripts/cluster", captures, "-o", results, *(engine or ["--cores", str(cores)])]
     command += ["--config", "shard_pixels=1", f"shards={args.shards}"]
     pin = ["taskset", "-c", "0"] if cores == 1 else []
     seconds = timed([*pin, *command], os.environ | {"LTM_EXPORT": str(recorder)})
@@ -192,6 +215,9 @@ def print_report(report):
     for cores in (1, 2):
         seconds = report[f"workflow_{cores}_s"]
         print(f"| workflow, cores: {cores} | {seconds:.1f} | {peer / seconds:.2f} |")
+    if "workflow_slurm_s" in report:
+        seconds = report["workflow_slurm_s"]
+        print(f"| workflow on Slurm, two nodes of one core | {seconds:.1f} | {peer / seconds:.2f} |")
     for cores, seconds in report["simulated_s"].items():
         print(f"| simulated, cores: {cores} | {seconds:.1f} | {peer / seconds:.2f} |")
     print(f"\n| {SIMULATED_SIDE} pixels a side, simulated | hours | times as fast as one core |\n|---|---|---|")

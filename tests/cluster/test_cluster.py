@@ -20,16 +20,20 @@ import two_node_slurm
 from two_node_slurm import SlurmUnavailable, TwoNodeSlurm, wait_until
 
 REPO = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("LTM_EXPORT", str(REPO / "target/release/ltm-export"))
+PROGRAM = os.path.abspath(os.environ.get("LTM_EXPORT", REPO / "target/release/ltm-export"))
 # Fast, as the recovery itself has tests of its own.
 OPTIONS = "--method nnls --window 7"
 SLURM = ["--profile", str(REPO / "workflow/profiles/slurm"), "--default-resources", "slurm_partition=main"]
 SLURM += ["--slurm-no-account", "--slurm-status-command", "squeue"]
-SLURM += ["--slurm-init-seconds-before-status-checks", "3", "--latency-wait", "20"]
+SLURM += ["--slurm-init-seconds-before-status-checks", "3", "--seconds-between-status-checks", "3"]
+SLURM += ["--latency-wait", "20"]
 SECONDS = 300
+# Camera pixels of three rows of tiles of the file, so that each of three shards has one.
+THREE_ROWS = "128x384"
 
 sys.path.insert(0, str(REPO / "workflow/scripts"))
 from captures import Capture, CollectionError, read_collection  # noqa: E402
+from engine_timing import bound_status_interval  # noqa: E402
 from write_page import page  # noqa: E402
 
 
@@ -89,14 +93,15 @@ class CollectionTest(WorkflowTest):
     """A collection on this machine."""
 
     def test_a_broken_capture_is_reported_and_runs_alone_when_repaired(self):
-        for seed in range(1, 5):
+        numbers = range(1, 21)
+        for seed in numbers:
             simulate(self.captures / f"window {seed}", seed)
         photograph = self.captures / "window 2/photos/0005.png"
         intact = shutil.copy2(photograph, self.folder)
         photograph.write_bytes(photograph.read_bytes()[:1000])
 
-        whole = ["window 1", "window 3", "window 4"]
-        self.assertEqual(self.workflow(), [f"window {i}: recover" for i in range(1, 5)])
+        whole = [f"window {i}" for i in numbers if i != 2]
+        self.assertEqual(self.workflow(), sorted(f"window {i}: recover" for i in numbers))
         self.assert_recovered(*whole)
         broken = self.report()["window 2"]
         self.assertEqual((broken["status"], broken["exit_status"]), ("failed", "65"))
@@ -161,23 +166,57 @@ class TemporaryFailureTest(WorkflowTest):
 class KilledDriverTest(WorkflowTest):
     """The end of Snakemake itself."""
 
-    def test_after_kill_9_only_unfinished_captures_run(self):
+    # Seven rows of tiles.
+    config = ("shards=7",)
+
+    def test_after_kill_9_only_unfinished_work_runs(self):
+        """A capture in shards, beside captures that are one job each."""
+        simulate(self.captures / "large", 7, "64x896")
         for seed in range(1, 7):
             simulate(self.captures / f"c{seed}", seed)
-        run = subprocess.Popen(self.command("--cores", "2"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        wait_until(lambda: len(list(self.results.glob("*.result.json"))) >= 2, SECONDS)
+        program = self.folder / "ltm-export"
+        program.write_text(f"#!/bin/sh\nexec '{PROGRAM}' \"$@\"\n", encoding="utf-8")
+        program.chmod(0o755)
+        environment = os.environ | {"LTM_EXPORT": str(program)}
+        devnull = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        run = subprocess.Popen(self.command("--cores", "2"), env=environment, **devnull)
+        packs = self.results / "stages/large/shards"
+
+        def finished():
+            captures = {path.name.split(".")[0] for path in self.results.glob("*.result.json")}
+            return captures, {path.name.split("-")[0] for path in packs.glob("*-of-7.pack")}
+
+        wait_until(lambda: min(map(len, finished())) >= 2, SECONDS)
         # pkg-scripts/cluster has become Snakemake.
         run.send_signal(signal.SIGKILL)
         run.wait()
-        wait_until(lambda: not processes(str(self.captures)), 30)
-        finished = {path.name.split(".")[0] for path in self.results.glob("*.result.json")}
-        self.assertLess(len(finished), 6)
-        ran = {job.split(":")[0] for job in self.workflow("--cores", "2")}
+        wait_until(lambda: not processes(str(self.folder)), 30)
+        captures, shards = finished()
+        self.assertLess(len(captures), 7)
+        self.assertLess(len(shards), 7)
+
+        program.write_text(SHARD_RECORDER.replace("PROGRAM", PROGRAM), encoding="utf-8")
+        jobs = self.workflow("--cores", "2", program=program)
+        ran = {job.split(":")[0] for job in jobs if job.endswith(": recover")}
         # Snakemake does not know of a job that ended as it was killed, so that it runs again.
-        self.assertLessEqual(len(ran & finished), 2)
-        self.assertEqual(ran | finished, {f"c{seed}" for seed in range(1, 7)})
+        self.assertLessEqual(len(ran & captures), 2)
+        self.assertEqual(ran | captures, {f"c{seed}" for seed in range(1, 7)})
         self.assertLess(len(ran), 6)
-        self.assert_recovered(*(f"c{seed}" for seed in range(1, 7)))
+        # Shards that it does not know of are complete, and nothing of them is recovered again.
+        recovered = (self.results / "recovered-shards").read_text(encoding="utf-8").split()
+        self.assertEqual(sorted(recovered), sorted({str(i) for i in range(1, 8)} - shards))
+        self.assert_recovered("large", *(f"c{seed}" for seed in range(1, 7)))
+
+
+# Adds the numbers of shards that are recovered to a file, but not of those that are complete.
+SHARD_RECORDER = """#!/bin/sh
+[ "$1 $2" = "stage tiles" ] || exec 'PROGRAM' "$@"
+printed=$('PROGRAM' "$@") || exit $?
+case $printed in
+  *"is complete"*) ;;
+  *) echo "${5%/*}" >>recovered-shards ;;
+esac
+"""
 
 
 # The jobs of a capture in three shards, sorted.
@@ -195,15 +234,16 @@ class ShardsTest(WorkflowTest):
     """A capture in shards on this machine."""
 
     def test_shards_give_the_bytes_of_recover(self):
-        simulate(self.captures / "large", 1, "128x128")
-        self.assertEqual(self.workflow(), [f"large: {stage}" for stage in STAGES])
+        simulate(self.captures / "large", 1, THREE_ROWS)
+        jobs = [job for job in self.workflow() if job.startswith("large: ")]
+        self.assertEqual(jobs, [f"large: {stage}" for stage in STAGES])
         self.assert_recovered("large")
         self.assertFalse((self.results / "stages/large").exists())
         self.assertEqual(self.workflow(), [])
 
     def test_a_fault_in_a_stage_is_the_captures(self):
         capture = self.captures / "at fault"
-        simulate(capture, 2, "128x128")
+        simulate(capture, 2, THREE_ROWS)
         photograph = capture / "photos/0003.png"
         intact = shutil.copy2(photograph, self.folder)
         photograph.write_bytes(photograph.read_bytes()[:1000])
@@ -216,6 +256,65 @@ class ShardsTest(WorkflowTest):
         self.workflow()
         self.assert_recovered("at fault")
 
+    def test_a_shard_that_is_killed_at_half_resumes(self):
+        simulate(self.captures / "killed", 4, THREE_ROWS)
+        whole = self.folder / "whole"
+        ltm_export("stage", "plan", self.captures / "killed", "-o", whole, *OPTIONS.split())
+        ltm_export("stage", "learn", whole)
+        ltm_export("stage", "tiles", whole, "--shard", "1/3")
+        half = (whole / "shards/1-of-3.pack").stat().st_size // 2
+        program = self.folder / "killer"
+        killer = KILLER.replace("PROGRAM", PROGRAM).replace("HALF", str(half))
+        program.write_text(killer, encoding="utf-8")
+        program.chmod(0o755)
+        self.workflow("--cores", "1", program=program)
+        logs = "".join(path.read_text(encoding="utf-8") for path in self.results.glob("logs/killed/*.log"))
+        self.assertRegex(logs, r"resuming with [1-9]\d* of")
+        self.assert_recovered("killed")
+
+    def test_a_shard_reads_its_rows_and_little_more(self):
+        capture, copy, stages = (self.folder / name for name in ("read", "read-copy", "read-stages"))
+        simulate(capture, 5, "512x512")
+        ltm_export("stage", "ingest", capture, "-o", copy)
+        ltm_export("stage", "plan", copy, "-o", stages, *OPTIONS.split())
+        ltm_export("stage", "learn", stages)
+        photographs = [path for path in (copy / "photos").iterdir() if path.name != "flood.tif"]
+        pixels = 6 * 512 * 512
+        rows = len(photographs) * pixels / 4
+        # What was learned, once to be checked; the records of photographs and patterns are much smaller.
+        others = 2 * (stages / "learned.bin").stat().st_size
+        for i in range(1, 5):
+            read, written = bytes_read_and_written([PROGRAM, "stage", "tiles", stages, "--shard", f"{i}/4"])
+            # Recovered tiles are read again to be encoded.
+            others_of_shard = others + written - (stages / f"shards/{i}-of-4.pack").stat().st_size
+            self.assertLessEqual(read - others_of_shard, 1.3 * rows, i)
+            self.assertGreater(read - others_of_shard, 0.8 * rows, i)
+
+
+# Kills the first shard with kill -9, and itself, when it has half of its tiles.
+KILLER = """#!/bin/sh
+if [ "$1 $2" = "stage tiles" ] && mkdir killed 2>/dev/null; then
+  'PROGRAM' "$@" &
+  while [ "$(cat "$3"/shards/*.partial 2>/dev/null | wc -c)" -lt HALF ]; do
+    kill -0 $! || exit 1
+    sleep 0.01
+  done
+  kill -9 $! $$
+fi
+exec 'PROGRAM' "$@"
+"""
+
+
+def bytes_read_and_written(command):
+    """Runs a command that has to succeed. Returns the bytes of all its reads, and of all its writes."""
+    process = subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    # Linux keeps the counts until the process is waited for.
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+    counts = Path(f"/proc/{process.pid}/io").read_text(encoding="utf-8")
+    if process.wait() != 0:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    return tuple(int(re.search(rf"^{name}: (\d+)", counts, re.MULTILINE)[1]) for name in ("rchar", "wchar"))
+
 
 class ShardsOfPngsTest(WorkflowTest):
     """A capture in shards that is not ingested."""
@@ -223,7 +322,7 @@ class ShardsOfPngsTest(WorkflowTest):
     config = ("ingest=false",)
 
     def test_shards_give_the_bytes_of_recover(self):
-        simulate(self.captures / "large", 3, "128x128")
+        simulate(self.captures / "large", 3, THREE_ROWS)
         self.assertEqual(self.workflow(), [f"large: {stage}" for stage in STAGES if "ingest" not in stage])
         self.assert_recovered("large")
 
@@ -474,6 +573,31 @@ class CollectionFileTest(unittest.TestCase):
         self.assertEqual(Capture("a", self.folder).fingerprint, prints[-1])
 
 
+class EngineTimingTest(unittest.TestCase):
+    """How often Slurm is asked for the state of jobs."""
+
+    def test_the_interval_is_bounded(self):
+        class Executor:
+            workflow = mock.Mock()
+            workflow.remote_execution_settings.seconds_between_status_checks = 30
+            interval = 3
+
+            @property
+            def next_seconds_between_status_checks(self):
+                return self.interval
+
+            @next_seconds_between_status_checks.setter
+            def next_seconds_between_status_checks(self, value):
+                self.interval = value
+
+        bound_status_interval(Executor)
+        executor, intervals = Executor(), []
+        for _ in range(5):
+            intervals.append(executor.next_seconds_between_status_checks)
+            executor.next_seconds_between_status_checks += 10
+        self.assertEqual(intervals, [3, 13, 23, 30, 30])
+
+
 class PageTest(unittest.TestCase):
     """The page under a strict content security policy."""
 
@@ -510,7 +634,7 @@ class OtherSlurmTest(unittest.TestCase):
         slurm = TwoNodeSlurm(self.folder)
         with self.assertRaisesRegex(SlurmUnavailable, "is another cluster's"):
             slurm.start()
-        slurm.stop()
+        slurm.close()
         self.commands.assert_not_called()
         self.assertEqual(self.configuration.read_text(encoding="utf-8"), "ClusterName=production\n")
 
@@ -518,11 +642,11 @@ class OtherSlurmTest(unittest.TestCase):
         slurm = TwoNodeSlurm(self.folder)
         slurm.settings = two_node_slurm.MARK + "ClusterName=test\n"
         self.configuration.write_text("ClusterName=production\n", encoding="utf-8")
-        slurm.stop()
+        slurm.close()
         self.commands.assert_not_called()
         self.assertTrue(self.configuration.exists())
         self.configuration.write_text(slurm.settings, encoding="utf-8")
-        slurm.stop()
+        slurm.close()
         self.commands.assert_called_once_with(["scancel", "--user=root"], capture_output=True)
         self.assertFalse(self.configuration.exists())
 
@@ -541,7 +665,6 @@ class FullDiskTest(WorkflowTest):
             self.skipTest("a small file system cannot be mounted")
         self.addCleanup(subprocess.run, ["umount", str(self.results)])
         stages, file = self.results / "stages", self.results / "large.ltm"
-        filler = self.results / "filler"
         copy, recovered = self.results / "copy", self.folder / "recovered.ltm"
         ltm_export("recover", capture, "-o", recovered, *OPTIONS.split())
         for command in (
@@ -552,14 +675,29 @@ class FullDiskTest(WorkflowTest):
             ["levels", stages, "--shard", "1/1"],
             ["assemble", stages, "--shards", "1", "-o", file],
         ):
-            # Less than a page is free, and folders take none.
-            filler.write_bytes(bytes(shutil.disk_usage(self.results).free))
-            ended = subprocess.run([PROGRAM, "stage", *command], capture_output=True, text=True)
-            self.assertEqual(ended.returncode, 75, f"{command}: {ended.stderr}")
-            self.assertIn("No space left on device", ended.stderr)
-            filler.unlink()
+            self.fails_without_space(["stage", *command])
             ltm_export("stage", *command)
         self.assertEqual(file.read_bytes(), recovered.read_bytes())
+        # The disk is full when half of a shard, or of a file, is written.
+        pack = stages / "shards/1-of-1.pack"
+        for command, again, output in (
+            (["stage", "tiles", stages, "--shard", "1/1"], [], pack),
+            (["recover", capture, "-o", file, *OPTIONS.split()], ["--resume"], file),
+        ):
+            expected = output.read_bytes()
+            output.unlink()
+            self.fails_without_space(command, spare=len(expected) // 2)
+            ltm_export(*command, *again)
+            self.assertEqual(output.read_bytes(), expected)
+
+    def fails_without_space(self, command, spare=0):
+        """Runs a command while so many bytes are free, or less than a page: folders take none."""
+        filler = self.results / "filler"
+        filler.write_bytes(bytes(shutil.disk_usage(self.results).free - spare))
+        ended = subprocess.run([PROGRAM, *map(str, command)], capture_output=True, text=True)
+        self.assertEqual(ended.returncode, 75, f"{command}: {ended.stderr}")
+        self.assertIn("No space left on device", ended.stderr)
+        filler.unlink()
 
 
 class SlurmTest(WorkflowTest):
@@ -567,7 +705,7 @@ class SlurmTest(WorkflowTest):
 
     def setUp(self):
         self.slurm = TwoNodeSlurm(self.folder / self.id().split(".")[-1])
-        self.addCleanup(self.slurm.stop)
+        self.addCleanup(self.slurm.close)
         try:
             self.slurm.start()
         except SlurmUnavailable as error:
@@ -577,7 +715,7 @@ class SlurmTest(WorkflowTest):
             self.skipTest(f"Slurm: {error}")
 
     def test_snakemake_and_the_array_give_the_bytes_of_recover(self):
-        simulate(self.captures / "large", 1, "128x128")
+        simulate(self.captures / "large", 1, THREE_ROWS)
         for seed in (2, 3, 4):
             simulate(self.captures / f"c{seed}", seed)
         photograph = self.captures / "c3/photos/0005.png"

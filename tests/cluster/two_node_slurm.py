@@ -1,4 +1,7 @@
-"""A Slurm of two nodes on this machine, for tests: real daemons from Debian's packages, without containers."""
+"""A Slurm of two nodes on this machine, for tests and a benchmark.
+
+Its daemons are real, from Debian's packages, without containers.
+"""
 
 import os
 import shutil
@@ -98,7 +101,7 @@ class TwoNodeSlurm:
         """Kills the daemon of a node, which leaves its jobs."""
         os.kill(self.nodes[node].pid, signal.SIGKILL)
 
-    def stop(self):
+    def close(self):
         """Cancels all jobs, stops the daemons and removes the configuration, if it is still the one of this object."""
         if self._is_configured():
             subprocess.run(["scancel", "--user=root"], capture_output=True)
