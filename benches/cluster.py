@@ -34,14 +34,10 @@ import numpy
 
 REPO = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(REPO / "tests/cluster"))
-from two_node_slurm import TwoNodeSlurm  # noqa: E402
+from two_node_slurm import SNAKEMAKE_OPTIONS, TwoNodeSlurm  # noqa: E402
 
-# Options for that Slurm, which keeps no accounting and whose nodes have 4 GB.
-SLURM = ["--profile", REPO / "workflow/profiles/slurm", "--default-resources", "slurm_partition=main"]
-SLURM += ["--slurm-no-account", "--slurm-status-command", "squeue"]
-SLURM += ["--slurm-init-seconds-before-status-checks", "3", "--seconds-between-status-checks", "3"]
-SLURM += ["--latency-wait", "20"]
-SLURM += ["--config", "memory_mb=3000"]
+# Its nodes have 4 GB.
+SLURM = [*SNAKEMAKE_OPTIONS, "--config", "memory_mb=3000"]
 # Stages in the order in which they run; the jobs of one run side by side.
 STAGES = ("ingest", "plan", "learn", "tiles", "levels", "assemble")
 # Those that are divided into as many jobs as there are shards.

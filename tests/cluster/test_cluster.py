@@ -17,16 +17,12 @@ from pathlib import Path
 from unittest import mock
 
 import two_node_slurm
-from two_node_slurm import SlurmUnavailable, TwoNodeSlurm, wait_until
+from two_node_slurm import SNAKEMAKE_OPTIONS, SlurmUnavailable, TwoNodeSlurm, wait_until
 
 REPO = Path(__file__).resolve().parents[2]
 PROGRAM = os.path.abspath(os.environ.get("LTM_EXPORT", REPO / "target/release/ltm-export"))
 # Fast, as the recovery itself has tests of its own.
 OPTIONS = "--method nnls --window 7"
-SLURM = ["--profile", str(REPO / "workflow/profiles/slurm"), "--default-resources", "slurm_partition=main"]
-SLURM += ["--slurm-no-account", "--slurm-status-command", "squeue"]
-SLURM += ["--slurm-init-seconds-before-status-checks", "3", "--seconds-between-status-checks", "3"]
-SLURM += ["--latency-wait", "20"]
 SECONDS = 300
 # Camera pixels of three rows of tiles of the file, so that each of three shards has one.
 THREE_ROWS = "128x384"
@@ -46,6 +42,13 @@ def simulate(folder, seed, camera="64x64"):
     """Makes a small capture."""
     size = ["--camera", camera, "--light", "16x16", "--patterns", "40", "--seed", seed]
     ltm_export("simulate", "stained-glass", "-o", folder, *size)
+
+
+def write_program(path, text):
+    """Writes a script that can be run. Returns its path."""
+    path.write_text(text, encoding="utf-8")
+    path.chmod(0o755)
+    return path
 
 
 class WorkflowTest(unittest.TestCase):
@@ -147,9 +150,7 @@ class TemporaryFailureTest(WorkflowTest):
     def test_exit_status_75_is_repeated_and_then_left_to_the_next_run(self):
         for seed in (1, 2, 3):
             simulate(self.captures / f"c{seed}", seed)
-        program = self.folder / "ltm-export"
-        program.write_text(FULL_DISK.replace("PROGRAM", PROGRAM), encoding="utf-8")
-        program.chmod(0o755)
+        program = write_program(self.folder / "ltm-export", FULL_DISK.replace("PROGRAM", PROGRAM))
         self.workflow(status=1, program=program)
         tries = (self.results / "tries").read_text(encoding="utf-8").split()
         self.assertEqual([tries.count(str(self.captures / name)) for name in ("c1", "c2")], [2, 3])
@@ -174,9 +175,7 @@ class KilledDriverTest(WorkflowTest):
         simulate(self.captures / "large", 7, "64x896")
         for seed in range(1, 7):
             simulate(self.captures / f"c{seed}", seed)
-        program = self.folder / "ltm-export"
-        program.write_text(f"#!/bin/sh\nexec '{PROGRAM}' \"$@\"\n", encoding="utf-8")
-        program.chmod(0o755)
+        program = write_program(self.folder / "ltm-export", f"#!/bin/sh\nexec '{PROGRAM}' \"$@\"\n")
         environment = os.environ | {"LTM_EXPORT": str(program)}
         devnull = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         run = subprocess.Popen(self.command("--cores", "2"), env=environment, **devnull)
@@ -195,7 +194,7 @@ class KilledDriverTest(WorkflowTest):
         self.assertLess(len(captures), 7)
         self.assertLess(len(shards), 7)
 
-        program.write_text(SHARD_RECORDER.replace("PROGRAM", PROGRAM), encoding="utf-8")
+        write_program(program, SHARD_RECORDER.replace("PROGRAM", PROGRAM))
         jobs = self.workflow("--cores", "2", program=program)
         ran = {job.split(":")[0] for job in jobs if job.endswith(": recover")}
         # Snakemake does not know of a job that ended as it was killed, so that it runs again.
@@ -263,10 +262,8 @@ class ShardsTest(WorkflowTest):
         ltm_export("stage", "learn", whole)
         ltm_export("stage", "tiles", whole, "--shard", "1/3")
         half = (whole / "shards/1-of-3.pack").stat().st_size // 2
-        program = self.folder / "killer"
         killer = KILLER.replace("PROGRAM", PROGRAM).replace("HALF", str(half))
-        program.write_text(killer, encoding="utf-8")
-        program.chmod(0o755)
+        program = write_program(self.folder / "killer", killer)
         self.workflow("--cores", "1", program=program)
         logs = "".join(path.read_text(encoding="utf-8") for path in self.results.glob("logs/killed/*.log"))
         self.assertRegex(logs, r"resuming with [1-9]\d* of")
@@ -356,9 +353,7 @@ class EngineTest(WorkflowTest):
     """What runs, and what does not, with a program that does nothing."""
 
     def setUp(self):
-        self.program = self.folder / "pretender"
-        self.program.write_text(PRETENDER, encoding="utf-8")
-        self.program.chmod(0o755)
+        self.program = write_program(self.folder / "pretender", PRETENDER)
         for name, side in (("a", 10), ("b", 10), ("large", 200)):
             (self.captures / name).mkdir()
             camera = {"width": side, "height": side}
@@ -420,9 +415,7 @@ class LauncherTest(WorkflowTest):
 
     def start(self, flock, *options):
         """Starts it with a flock that ends with a status. Returns what it says on standard error."""
-        command = self.folder / "flock"
-        command.write_text(f"#!/bin/sh\nexit {flock}\n", encoding="utf-8")
-        command.chmod(0o755)
+        write_program(self.folder / "flock", f"#!/bin/sh\nexit {flock}\n")
         environment = os.environ | {"LTM_EXPORT": "true", "PATH": f"{self.folder}:{os.environ['PATH']}"}
         ended = subprocess.run(self.command(*options), env=environment, capture_output=True, text=True, timeout=SECONDS)
         self.assertEqual(ended.returncode, 1)
@@ -449,8 +442,7 @@ class ArrayTest(unittest.TestCase):
         sbatch = '#!/bin/sh\nfor a; do case $a in --wrap=*) sh -c "${a#--wrap=}" ;; esac; done\necho 1\n'
         program = f'#!/bin/sh\nprintf "%s|" "$RAYON_NUM_THREADS" "$@" >>"{folder}/calls"\n'
         for file, content in (("sbatch", sbatch), ("it's", program)):
-            (folder / file).write_text(content, encoding="utf-8")
-            (folder / file).chmod(0o755)
+            write_program(folder / file, content)
         environment = {"PATH": f"{folder}:{os.environ['PATH']}", "LTM_EXPORT": str(folder / "it's")}
         environment |= {"SLURM_CPUS_PER_TASK": "3", "SLURM_ARRAY_TASK_ID": "2", "OPTIONS": "--window 7"}
         command = [REPO / "workflow/array.sbatch", folder / name, folder / f"{name}.ltm", "4"]
@@ -720,7 +712,7 @@ class SlurmTest(WorkflowTest):
             simulate(self.captures / f"c{seed}", seed)
         photograph = self.captures / "c3/photos/0005.png"
         photograph.write_bytes(photograph.read_bytes()[:1000])
-        self.workflow(*SLURM, "--group-components", "captures=2")
+        self.workflow(*SNAKEMAKE_OPTIONS, "--group-components", "captures=2")
         self.assert_recovered("large", "c2", "c4")
         self.assertEqual(self.report()["c3"]["exit_status"], "65")
 

@@ -11,6 +11,11 @@ import subprocess
 import time
 from pathlib import Path
 
+# Options for Snakemake: there is no accounting, and jobs take seconds.
+SNAKEMAKE_OPTIONS = ["--profile", str(Path(__file__).resolve().parents[2] / "workflow/profiles/slurm")]
+SNAKEMAKE_OPTIONS += ["--default-resources", "slurm_partition=main", "--latency-wait", "20"]
+SNAKEMAKE_OPTIONS += ["--slurm-no-account", "--slurm-status-command", "squeue"]
+SNAKEMAKE_OPTIONS += ["--slurm-init-seconds-before-status-checks", "3", "--seconds-between-status-checks", "3"]
 PACKAGES = ["slurmctld", "slurmd", "slurm-client", "munge"]
 CONF = Path("/etc/slurm/slurm.conf")
 MARK = "# Written by tests/cluster/two_node_slurm.py\n"
