@@ -115,7 +115,7 @@ pub enum CaptureErrorKind {
     /// The file does not have the format given first, or is damaged.
     #[error("is not a readable {0}: {1}")]
     Unreadable(&'static str, String),
-    /// A tile of an ingested photograph, in the place that is given, was damaged after it was written.
+    /// An ingested photograph was damaged after it was written, in the place that is given.
     #[error("has a wrong checksum in {0}")]
     WrongChecksum(String),
     /// The size of a picture differs from the manifest's.

@@ -15,7 +15,9 @@ pub fn capture_remedy(error: &CaptureError) -> Option<&'static str> {
         CaptureErrorKind::NoShots => "list the patterns and their photographs",
         CaptureErrorKind::MissingGrayCode { .. } => "add it, or give \"correspondence\"",
         CaptureErrorKind::Unreadable(..) => "export or copy it again",
-        CaptureErrorKind::WrongChecksum(_) => "delete it and run \"ltm-export stage ingest\" again",
+        CaptureErrorKind::WrongChecksum(_) => {
+            "delete it: \"ltm-export stage ingest CAPTURE -o COPY\" writes it again"
+        }
         CaptureErrorKind::WrongExtent { .. } => "correct one of them",
         CaptureErrorKind::PhotoType(_) => "export it again from raw",
         CaptureErrorKind::PatternType(_) => "convert it",

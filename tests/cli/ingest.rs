@@ -83,7 +83,7 @@ fn a_shard_reads_only_its_rows() {
     job.tiles("2/4");
     assert!(fs::read(&pack).unwrap() == expected);
     for (shard, rows) in [("1/4", "rows 0 to 15;"), ("3/4", "rows 272 to 287;")] {
-        let remedy = "delete it and run \"ltm-export stage ingest\" again";
+        let remedy = "delete it: \"ltm-export stage ingest CAPTURE -o COPY\" writes it again";
         fails(&job.tiles_args(shard), 65, &["photos/", rows, remedy]);
     }
     fs::remove_dir_all(job.capture.join("photos")).unwrap();
@@ -119,6 +119,19 @@ fn ingesting_again_writes_what_has_changed() {
     let said = said.map(|said| String::from_utf8(said).unwrap()).concat();
     assert!(said.contains(": 1 files written"), "{said}");
     fails(&job.tiles_args("1/1"), 65, &["0001.tif has changed since"]);
+    // A damaged histogram, near the end of the file.
+    let intact = fs::read(&photograph).unwrap();
+    let mut damaged = intact.clone();
+    let middle = (64 * ROW_BYTES + TILES_START + intact.len()) / 2;
+    damaged[middle] ^= 1;
+    fs::write(&photograph, damaged).unwrap();
+    let file = job.path("damaged.ltm");
+    let recover = ["recover", text(&copy), "-o", text(&file)];
+    let words = ["photos/0001.tif", "in its record; delete it"];
+    fails(&[&recover[..], &NNLS].concat(), 65, &words);
+    let said = String::from_utf8(succeeds(&again).stdout).unwrap();
+    assert!(said.contains(": 1 files written"), "{said}");
+    assert!(fs::read(&photograph).unwrap() == intact);
     // A copy of the copy has the same TIFFs.
     let third = job.path("third");
     succeeds(&ingest(&copy, &third));

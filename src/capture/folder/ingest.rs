@@ -118,8 +118,11 @@ impl IngestedPhotograph {
         }
         file.rewind()?;
         let bytes = file.metadata()?.len();
-        let record = Decoder::new(BufReader::with_capacity(TAG_BYTES, file))
-            .and_then(|mut decoder| IngestRecord::read(&mut decoder));
+        let source = BufReader::with_capacity(TAG_BYTES, file);
+        let record = Decoder::new(source).and_then(|mut decoder| {
+            let record = IngestRecord::read(&mut decoder)?;
+            Ok(record.filter(|record| record.has_histogram(&mut decoder)))
+        });
         match record {
             Ok(record) => Ok(record.map(|record| Self {
                 source: record.source,

@@ -74,18 +74,30 @@ impl IngestRecord {
         saturated_from: [u32; CHANNELS],
     ) -> TiffResult<CodeStatistics> {
         let (width, height) = decoder.dimensions()?;
+        let histogram = self.compressed_histogram(decoder)?;
+        let histogram = CodeHistogram::decompress(histogram.as_bytes()).ok_or_else(damaged)?;
+        match histogram.is_of(u64::from(width) * u64::from(height)) {
+            true => Ok(histogram.statistics(saturated_from)),
+            false => Err(damaged()),
+        }
+    }
+
+    /// Whether the histogram of the photograph with this record is intact.
+    pub fn has_histogram<R: Read + Seek>(&self, decoder: &mut Decoder<R>) -> bool {
+        self.compressed_histogram(decoder).is_ok()
+    }
+
+    fn compressed_histogram<R: Read + Seek>(
+        &self,
+        decoder: &mut Decoder<R>,
+    ) -> TiffResult<ValueBuffer> {
         // Other functions make each byte a value of 32 bytes.
         let mut histogram = ValueBuffer::empty(Type::BYTE);
         decoder
             .image_ifd()
             .find_tag_buf(HISTOGRAM, &mut histogram)?;
-        let histogram = histogram.as_bytes();
-        if self.checksums.last() != Some(&crc32c::crc32c(histogram)) {
-            return Err(damaged());
-        }
-        let histogram = CodeHistogram::decompress(histogram).ok_or_else(damaged)?;
-        match histogram.is_of(u64::from(width) * u64::from(height)) {
-            true => Ok(histogram.statistics(saturated_from)),
+        match self.checksums.last() == Some(&crc32c::crc32c(histogram.as_bytes())) {
+            true => Ok(histogram),
             false => Err(damaged()),
         }
     }

@@ -15,6 +15,10 @@ use crate::capture::error::CaptureError;
 use crate::tiff_signature::is_tiff;
 use crate::transport::{CHANNELS, Extent};
 
+/// The first bytes of a PNG.
+#[cfg(not(target_arch = "wasm32"))]
+const PNG_SIGNATURE: &[u8] = b"\x89PNG";
+
 /// A 16-bit RGB photograph that is read row by row from the top. Pages read PNG only.
 pub(super) enum PhotographCodes<'a, F: CaptureFiles> {
     Png(Box<PngRowReader<'a, F>>),
@@ -37,10 +41,18 @@ impl<'a, F: CaptureFiles> PhotographCodes<'a, F> {
         let mut start = Vec::new();
         let read = file.open()?.take(4).read_to_end(&mut start);
         read.map_err(|e| file.io_error(e))?;
-        Ok(match is_tiff(&start) {
-            true => Self::Tiff(Box::new(TiffRowReader::open_within(file, max_bytes)?)),
-            false => Self::Png(Box::new(PngRowReader::open(file)?)),
-        })
+        if is_tiff(&start) {
+            let reader = TiffRowReader::open_within(file, max_bytes)?;
+            return Ok(Self::Tiff(Box::new(reader)));
+        }
+        if !start.starts_with(PNG_SIGNATURE) {
+            let reason = match start.is_empty() {
+                true => "it is empty",
+                false => "it begins like neither",
+            };
+            return Err(file.unreadable("PNG or TIFF", reason));
+        }
+        Ok(Self::Png(Box::new(PngRowReader::open(file)?)))
     }
 
     pub fn extent(&self) -> Extent {

@@ -58,7 +58,7 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
             return Err(file.unreadable("TIFF", "it has no pixels"));
         }
         let sample_type = layout.sample_type(max_bytes).map_err(|e| file.error(e))?;
-        let record = IngestRecord::read(&mut decoder).map_err(|e| unreadable(&file, e))?;
+        let record = IngestRecord::read(&mut decoder).map_err(|e| damaged_record(&file, e))?;
         if record.is_none() {
             // The decompressor reads through the buffer.
             let source = BufReader::with_capacity(READ_BYTES, file.open()?);
@@ -211,7 +211,7 @@ impl<'a, F: CaptureFiles> TiffRowReader<'a, F> {
             return Ok(None);
         };
         let statistics = record.statistics(&mut self.decoder, saturated_from);
-        statistics.map(Some).map_err(|e| unreadable(&self.file, e))
+        { statistics.map(Some) }.map_err(|e| damaged_record(&self.file, e))
     }
 }
 
@@ -220,6 +220,13 @@ fn unreadable<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> C
         // The disk or the network is at fault, not the file.
         TiffError::IoError(e) if e.raw_os_error().is_some() => file.io_error(e),
         error => file.unreadable("TIFF", error),
+    }
+}
+
+fn damaged_record<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> CaptureError {
+    match error {
+        TiffError::IoError(e) if e.raw_os_error().is_some() => file.io_error(e),
+        _ => file.error(CaptureErrorKind::WrongChecksum("its record".to_owned())),
     }
 }
 
@@ -584,7 +591,7 @@ mod tests {
             .unwrap();
         let said = damaged(at).unwrap_err();
         assert!(
-            said.contains("its record of ltm-export is damaged"),
+            said.contains("has a wrong checksum in its record"),
             "{said}"
         );
     }
