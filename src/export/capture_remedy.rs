@@ -15,6 +15,7 @@ pub fn capture_remedy(error: &CaptureError) -> Option<&'static str> {
         CaptureErrorKind::NoShots => "list the patterns and their photographs",
         CaptureErrorKind::MissingGrayCode { .. } => "add it, or give \"correspondence\"",
         CaptureErrorKind::Unreadable(..) => "export or copy it again",
+        #[cfg(not(target_arch = "wasm32"))] // pages read no TIFF
         CaptureErrorKind::WrongChecksum(_) => {
             "delete it: \"ltm-export stage ingest CAPTURE -o COPY\" writes it again"
         }
