@@ -5,9 +5,9 @@ use std::io::{self, BufReader, Read, Seek, Write};
 use std::path::Path;
 
 use thiserror::Error;
-use tiff::TiffError;
 use tiff::decoder::Decoder;
 use tiff::encoder::{TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard};
+use tiff::{TiffError, TiffResult};
 
 use super::CaptureFolder;
 use super::files::CaptureFiles;
@@ -110,6 +110,21 @@ impl IngestedPhotograph {
     /// # Errors
     /// If the file cannot be read.
     pub fn read(path: &Path) -> io::Result<Option<Self>> {
+        Self::read_if(path, |_, _| Ok(()))
+    }
+
+    /// The same, with its histogram: `None` if that is damaged as well.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn read_whole(path: &Path) -> io::Result<Option<Self>> {
+        Self::read_if(path, IngestRecord::check_histogram)
+    }
+
+    fn read_if(
+        path: &Path,
+        check: impl FnOnce(&IngestRecord, &mut Decoder<BufReader<File>>) -> TiffResult<()>,
+    ) -> io::Result<Option<Self>> {
         let mut file = File::open(path)?;
         let mut start = Vec::new();
         Read::by_ref(&mut file).take(4).read_to_end(&mut start)?;
@@ -121,7 +136,10 @@ impl IngestedPhotograph {
         let source = BufReader::with_capacity(TAG_BYTES, file);
         let record = Decoder::new(source).and_then(|mut decoder| {
             let record = IngestRecord::read(&mut decoder)?;
-            Ok(record.filter(|record| record.has_histogram(&mut decoder)))
+            if let Some(record) = &record {
+                check(record, &mut decoder)?;
+            }
+            Ok(record)
         });
         match record {
             Ok(record) => Ok(record.map(|record| Self {

@@ -82,9 +82,9 @@ impl IngestRecord {
         }
     }
 
-    /// Whether the histogram of the photograph with this record is intact.
-    pub fn has_histogram<R: Read + Seek>(&self, decoder: &mut Decoder<R>) -> bool {
-        self.compressed_histogram(decoder).is_ok()
+    /// Fails if the histogram of the photograph with this record is damaged.
+    pub fn check_histogram<R: Read + Seek>(&self, decoder: &mut Decoder<R>) -> TiffResult<()> {
+        self.compressed_histogram(decoder).map(drop)
     }
 
     fn compressed_histogram<R: Read + Seek>(

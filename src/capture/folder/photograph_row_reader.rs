@@ -113,16 +113,15 @@ pub(super) fn read_rows<F: CaptureFiles>(
 ) -> Result<(), CaptureError> {
     let is_recorded = codes.is_recorded();
     while *next_row < end {
-        if is_recorded {
+        let row = if is_recorded {
             *next_row = pixels.rows().first_from(*next_row).unwrap_or(end);
             if *next_row >= end {
                 break;
             }
             codes.skip_to(*next_row);
-        }
-        let row = match is_recorded {
-            true => codes.next_columns(pixels.spans_of(*next_row))?,
-            false => codes.next()?,
+            codes.next_columns(pixels.spans_of(*next_row))?
+        } else {
+            codes.next()?
         };
         let Some(row) = row else {
             break;

@@ -32,7 +32,7 @@ pub(super) struct TiffRowReader<'a, F: CaptureFiles> {
     chunk: Extent,
     sample_type: SampleType,
     record: Option<IngestRecord>,
-    /// What was read last, until it is released.
+    /// The rows that were read last, until they are released.
     read: Option<ChunkRow>,
     next_row: u32,
 }
@@ -224,9 +224,12 @@ fn unreadable<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> C
 }
 
 fn damaged_record<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> CaptureError {
-    match error {
-        TiffError::IoError(e) if e.raw_os_error().is_some() => file.io_error(e),
-        _ => file.error(CaptureErrorKind::WrongChecksum("its record".to_owned())),
+    let error = unreadable(file, error);
+    match error.problem {
+        CaptureErrorKind::Unreadable(..) => {
+            file.error(CaptureErrorKind::WrongChecksum("its record".to_owned()))
+        }
+        _ => error,
     }
 }
 

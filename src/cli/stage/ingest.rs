@@ -163,7 +163,7 @@ impl<'a> Ingestion<'a> {
             format!("{folder}: cannot be created; may you write there?")
         })?;
         // A photograph that was ingested keeps its record.
-        let record = IngestedPhotograph::read(&from);
+        let record = IngestedPhotograph::read_whole(&from);
         let is_ingested = record.map_err(|e| read_error(&from, e))?.is_some();
         let unchanged = || match modified(&from)? == before {
             true => Ok(()),
@@ -213,7 +213,7 @@ impl<'a> Ingestion<'a> {
             self.capture.root().join(file.name),
             self.output.join(target),
         );
-        let record = |path: &Path| IngestedPhotograph::read(path).ok().flatten();
+        let record = |path: &Path| IngestedPhotograph::read_whole(path).ok().flatten();
         match (file.photograph, record(&to)) {
             (None, _) => length(&to).is_some_and(|bytes| length(&from) == Some(bytes)),
             (Some(_), None) => false,
@@ -311,7 +311,7 @@ fn write_text(path: &Path, text: &str) -> Result<()> {
 }
 
 fn ingested(path: &Path) -> Result<Option<IngestedPhotograph>> {
-    IngestedPhotograph::read(path).with_context(|| path.display().to_string())
+    IngestedPhotograph::read_whole(path).with_context(|| path.display().to_string())
 }
 
 /// When a file of the capture was changed, and its length.
