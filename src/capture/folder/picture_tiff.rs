@@ -1,7 +1,7 @@
 //! TIFF photographs: linear RGB of 16-bit integers or floating-point numbers, in strips or tiles. With the record of
 //! [`IngestRecord`], tiles are read without the others.
 
-use std::io::BufReader;
+use std::io::{self, BufReader};
 use std::ops::Range;
 
 use tiff::TiffError;
@@ -219,6 +219,9 @@ fn unreadable<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> C
     match error {
         // The disk or the network is at fault, not the file.
         TiffError::IoError(e) if e.raw_os_error().is_some() => file.io_error(e),
+        TiffError::IoError(e) if e.kind() == io::ErrorKind::UnexpectedEof => {
+            file.unreadable("TIFF", "it is cut off")
+        }
         error => file.unreadable("TIFF", error),
     }
 }
@@ -237,7 +240,7 @@ fn damaged_record<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) 
 mod tests {
     use std::cell::Cell;
     use std::collections::BTreeMap;
-    use std::io::{self, Cursor};
+    use std::io::Cursor;
     use std::path::PathBuf;
 
     use tiff::encoder::colortype::{
@@ -586,7 +589,10 @@ mod tests {
             "{said}"
         );
         let said = fault(whole[..whole.len() / 2].to_vec()).unwrap_err();
-        assert!(said.contains("is not a readable TIFF"), "{said}");
+        assert!(
+            said.contains("is not a readable TIFF: it is cut off"),
+            "{said}"
+        );
         // The text that names the source.
         let at = whole
             .windows(5)
