@@ -1383,6 +1383,7 @@ fn tiles_may_be_brighter_than_all_of_the_sample() {
     }
     for (recovered, quality) in [(recovered.clone(), 35.0), (recovered, 60.0), (dark, 40.0)] {
         let encoded = recovered.encode_planned(EncodingTarget::Snr(Decibels(quality)), 8, |_| true);
+        assert_eq!(encoded.clipped_tiles(), 0);
         let (decoded, _) = decode(&bytes(&encoded), usize::MAX).unwrap();
         let snr = recovered.error(&decoded).snr().unwrap().0;
         assert!(snr > quality - 10.0, "{snr}");
@@ -1392,6 +1393,31 @@ fn tiles_may_be_brighter_than_all_of_the_sample() {
             snr > declared.min(52.0) - 1.0,
             "{snr}, declared as {declared}"
         );
+    }
+}
+
+#[test]
+fn tiles_with_clipped_values_are_counted() {
+    let affine = [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]];
+    let geometry = common::tiled([64, 64], [32, 32], 3, 16, affine);
+    let mut recovered = Recovered::mixed(geometry, 4, 5);
+    // Glints far above all that the camera measures: in a direct tile, and in two factored ones.
+    for i in [4, 5, 7] {
+        let tile = &mut recovered.tiles[i];
+        for values in [&mut tile.coefficients, &mut tile.functions] {
+            let last = values.len().saturating_sub(1);
+            values[last..].fill([1e5, 0.0, 0.0]);
+        }
+    }
+    for target in [
+        QUALITY,
+        EncodingTarget::Snr(Decibels(60.0)),
+        EncodingTarget::Lossless,
+    ] {
+        let encoded = recovered.encode_planned(target, 8, |_| true);
+        assert_eq!(encoded.clipped_tiles(), 3, "{target:?}");
+        // A plan from all tiles reaches them.
+        assert_eq!(recovered.encode(target).unwrap().clipped_tiles(), 0);
     }
 }
 

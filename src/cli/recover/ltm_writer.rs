@@ -2,11 +2,13 @@
 
 use std::fs::File;
 use std::io;
+use std::mem;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Error, Result};
 
+use super::findings::Findings;
 use super::inputs::{RecoveryInputs, encoders};
 use super::messages;
 use super::prepared_job::PreparedJob;
@@ -107,6 +109,10 @@ struct LtmWriter<'a, T> {
     quality: FileQuality,
     /// Number of levels of the file.
     levels: u32,
+    /// Those about the capture, to which those about the file are added.
+    findings: Findings,
+    /// Whether a warning is an error.
+    strict: bool,
 }
 
 /// Writes the file of `tiles`, as `recover` and its last stage do. `counts` are those of the tiles.
@@ -126,18 +132,22 @@ pub fn finish(
     job.findings.add(messages::overexposure(counts.overexposed));
     job.findings.check(inputs.options.strict)?;
     let metadata = job.metadata(&inputs.shots, inputs.options.method())?;
+    let findings = mem::take(&mut job.findings);
     let input = WriterInput {
         job: &job,
         metadata: &metadata,
         destination,
     };
-    let writer = LtmWriter {
+    let mut writer = LtmWriter {
         tiles,
         input,
         quality: inputs.options.quality(),
         levels: inputs.levels,
+        findings,
+        strict: inputs.options.strict,
     };
     let written = writer.write()?;
+    job.findings = writer.findings;
     Ok(RecoverReport::new(start, inputs, &job, counts, &written))
 }
 
@@ -151,7 +161,7 @@ pub struct WrittenFile {
 impl<T: FileTiles> LtmWriter<'_, T> {
     /// Encodes the tiles and writes the file. An interruption is reported as
     /// [`Cancelled`](crate::job_executor::Cancelled).
-    fn write(&self) -> Result<WrittenFile> {
+    fn write(&mut self) -> Result<WrittenFile> {
         let WriterInput {
             job, destination, ..
         } = self.input;
@@ -161,7 +171,7 @@ impl<T: FileTiles> LtmWriter<'_, T> {
         thread_pool(encoders)?.install(|| self.write_within_limit())
     }
 
-    fn write_within_limit(&self) -> Result<WrittenFile> {
+    fn write_within_limit(&mut self) -> Result<WrittenFile> {
         let _spinner = progress::spinner("compressing");
         let (levels, destination) = (self.levels, self.input.destination);
         let mut quality = self.quality;
@@ -175,6 +185,9 @@ impl<T: FileTiles> LtmWriter<'_, T> {
         loop {
             let file = self.tiles.encode(&self.input, quality);
             let file = file.map_err(|error| self.writing_error(error, max_bytes))?;
+            let clipped = messages::clipped_tiles(file.clipped_tiles(), file.index().tiles());
+            self.findings.add(clipped);
+            self.findings.check(self.strict)?;
             let output = OutputFile::create(destination.output, &LTM)?;
             let written = output.finish(|out| match levels {
                 1 => Ok(file.write(out)?),

@@ -259,6 +259,15 @@ pub fn overexposure(pixels: usize) -> Option<Finding> {
     (pixels > 0).then(|| Finding::warning("overexposed", message))
 }
 
+/// Warns of tiles of the file whose values are clipped; there are `all` tiles.
+pub fn clipped_tiles(tiles: usize, all: usize) -> Option<Finding> {
+    let message = format!(
+        "{tiles} of {all} tiles of the file have values far above those of the sample that it is planned from; they are \
+         clipped, so that these pixels are too dark under some lights. With --max-bytes, the file is planned from all tiles"
+    );
+    (tiles > 0).then(|| Finding::warning("clipped", message))
+}
+
 /// Notes how photographs are corrected, and warns of those that are left out; `shots` are those of the measurements.
 pub fn photographs(
     folder: &CaptureFolder,

@@ -41,6 +41,7 @@ mod tests {
                 entries: vec![entry(3), entry(0), entry(2)],
                 signal: 0.1,
                 errors: vec![0.3, 0.2, 1e-9],
+                is_clipped: true,
             },
             chunks: vec![vec![1, 2, 3], vec![], vec![4, 5]],
         };

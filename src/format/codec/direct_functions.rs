@@ -207,6 +207,20 @@ impl QuantisedDirectFunctions {
         decoded
     }
 
+    /// Whether a value is larger than the numbers of its last scan reach.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn is_clipped(&self, scans: &[ProgressiveScan], slots: usize) -> bool {
+        let mut steps = vec![f32::INFINITY; slots];
+        for scan in scans.iter().filter(|scan| scan.coding.is_direct()) {
+            steps[scan.items()].fill(scan.step);
+        }
+        // Rounding leaves less than a step, and a number whose sum is restored differs by one.
+        let is_large =
+            |(error, step): (&ColourVector, &f32)| error.iter().any(|e| e.abs() > 2.0 * step);
+        let mut of_pixels = self.residual.chunks_exact(slots);
+        of_pixels.any(|errors| errors.iter().zip(&steps).any(is_large))
+    }
+
     /// The chunks of all scans.
     ///
     /// # Errors

@@ -38,6 +38,14 @@ pub fn encode(values: &[f32], step: f32) -> Result<Vec<u8>, FormatError> {
     ))
 }
 
+/// Whether a finite value is larger than a half-precision number of `step` reaches.
+#[cfg(not(target_arch = "wasm32"))]
+pub fn is_clipped(values: &[f32], step: f32) -> bool {
+    let of_steps = |value: &f32| (value / step).abs();
+    let mut all = values.iter().map(of_steps);
+    all.any(|steps| steps.is_finite() && steps > f16::MAX.to_f32())
+}
+
 /// Squared error of [`encode`] on finite values.
 pub fn error(values: &[f32], step: f32) -> f64 {
     let error =

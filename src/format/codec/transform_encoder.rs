@@ -181,6 +181,23 @@ impl QuantisedCoefficients {
             .coefficients(extent, rank, &MemoryBudget::unlimited())
     }
 
+    /// Whether a coefficient is larger than the numbers of its last scan reach.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn is_clipped(&self, scans: &[ProgressiveScan]) -> bool {
+        let of_scans = scans.iter().zip(&self.numbers).enumerate();
+        let mut of_scans = of_scans.filter(|(_, (scan, _))| !scan.coding.is_direct());
+        of_scans.any(|(s, (scan, numbers))| {
+            let later = |k: usize| {
+                let covers =
+                    |scan: &ProgressiveScan| !scan.coding.is_direct() && scan.items().contains(&k);
+                scans[s + 1..].iter().any(covers)
+            };
+            let components = numbers.chunks_exact(CHANNELS * self.blocks * AREA);
+            let mut last = scan.items().zip(components).filter(|(k, _)| !later(*k));
+            last.any(|(_, numbers)| numbers.iter().any(|n| n.abs() == MAX_MAGNITUDE))
+        })
+    }
+
     /// Quantises component `k`, and adds its decoded values to `decoded`.
     fn quantise_component(
         &mut self,
@@ -419,6 +436,26 @@ mod tests {
                     quantised.decoded(extent).unwrap()
                 );
             }
+        }
+    }
+
+    #[test]
+    fn values_beyond_the_numbers_of_their_last_scan_are_told() {
+        let extent = Extent::new(16, 9);
+        let mut tile = tile(extent, 3);
+        let scans = [scan(0, 3, 1e-2), scan(0, 1, 1e-3), scan(1, 1, 1e-2)];
+        let is_clipped = |tile: &[ColourVector]| {
+            QuantisedCoefficients::new(extent, tile, 3, &scans, false).is_clipped(&scans)
+        };
+        assert!(!is_clipped(&tile));
+        // The first scan does not reach so far, but the second has the rest.
+        tile[0] = [350.0; CHANNELS];
+        tile[3] = [-350.0; CHANNELS];
+        assert!(!is_clipped(&tile));
+        for (k, value) in [(0, 3e4), (1, 6e3), (2, -6e3)] {
+            let mut tile = tile.clone();
+            tile[3 * 20 + k] = [value; CHANNELS];
+            assert!(is_clipped(&tile), "{k}");
         }
     }
 

@@ -36,6 +36,9 @@ pub struct EncodedFile<S = Vec<Vec<u8>>> {
     pub(super) index: FileIndex,
     pub(super) index_bytes: Vec<u8>,
     pub(super) chunks: S,
+    /// Number of tiles with values that the numbers of a coding plan do not reach.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) clipped_tiles: usize,
 }
 
 impl<S: ChunkStore> EncodedFile<S> {
@@ -52,6 +55,12 @@ impl<S: ChunkStore> EncodedFile<S> {
     /// SNR against the source; `None` if it is dark.
     pub fn snr(&self) -> Option<Decibels> {
         self.index.scans.last().map(|scan| scan.snr)
+    }
+
+    /// Number of tiles with clipped values, which are far above all of the sample that the file was planned from.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn clipped_tiles(&self) -> usize {
+        self.clipped_tiles
     }
 
     /// A file of the chunks in `chunks`, whose `entries` are `[scan, tile]`.
@@ -72,6 +81,8 @@ impl<S: ChunkStore> EncodedFile<S> {
             index,
             index_bytes,
             chunks,
+            #[cfg(not(target_arch = "wasm32"))]
+            clipped_tiles: 0,
         })
     }
 
@@ -109,6 +120,9 @@ pub struct QuantisedTile {
 pub struct TileChunks {
     pub chunks: Vec<EncodedChunk>,
     pub errors: Vec<f64>,
+    /// Whether a value is larger than the numbers of its last scan reach.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub is_clipped: bool,
 }
 
 impl TileChunks {
@@ -127,7 +141,16 @@ impl TileChunks {
         };
         match scans.iter().any(is_lossless) {
             true => encode_halves(tile, rank, order, scans),
-            false => QuantisedTile::new(tile, rank, order, scans, false).encode(scans),
+            false => {
+                let quantised = QuantisedTile::new(tile, rank, order, scans, false);
+                let encoded = quantised.encode(scans)?;
+                #[cfg(not(target_arch = "wasm32"))]
+                let encoded = Self {
+                    is_clipped: quantised.is_clipped(scans, order.len()),
+                    ..encoded
+                };
+                Ok(encoded)
+            }
         }
     }
 }
@@ -174,6 +197,14 @@ impl QuantisedTile {
         }
     }
 
+    /// Whether a value is larger than the numbers of its last scan reach; `slots` are those of a window.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn is_clipped(&self, scans: &[ProgressiveScan], slots: usize) -> bool {
+        let (coefficients, functions) = (self.coefficients.as_ref(), self.functions.as_ref());
+        coefficients.is_some_and(|q| q.is_clipped(scans))
+            || functions.is_some_and(|q| q.is_clipped(scans, slots))
+    }
+
     fn encode(&self, scans: &[ProgressiveScan]) -> Result<TileChunks, FormatError> {
         let coefficients = self.coefficients.as_ref().map(|q| q.chunks(scans));
         let functions = self.functions.as_ref().map(|q| q.chunks(scans));
@@ -190,6 +221,8 @@ impl QuantisedTile {
         Ok(TileChunks {
             chunks,
             errors: errors.collect(),
+            #[cfg(not(target_arch = "wasm32"))]
+            is_clipped: false,
         })
     }
 }
@@ -248,6 +281,10 @@ fn encode_halves(
         let energy = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
         energies.push(energy);
         errors.push(half_float_codec::error(&values, scan.step).max(HALVES_ERROR_RATIO * energy));
+        #[cfg(not(target_arch = "wasm32"))]
+        {
+            encoded.is_clipped |= half_float_codec::is_clipped(&values, scan.step);
+        }
         encoded.chunks.push(match values.iter().all(|v| *v == 0.0) {
             true => EncodedChunk::default(),
             false => EncodedChunk {

@@ -79,6 +79,8 @@ pub struct EncodedTileHead {
     pub signal: f64,
     /// Squared error after each scan.
     pub errors: Vec<f64>,
+    /// Whether a value is larger than the plan's numbers reach: far above all of the sample.
+    pub is_clipped: bool,
 }
 
 impl CodingPlan {
@@ -251,8 +253,11 @@ impl<'a> TileEncoder<'a> {
             missing += function_energy;
             tile.functions.clear();
         }
-        let TileChunks { chunks, mut errors } =
-            TileChunks::new(&tile, plan.rank, &self.order, &plan.scans)?;
+        let TileChunks {
+            chunks,
+            mut errors,
+            is_clipped,
+        } = TileChunks::new(&tile, plan.rank, &self.order, &plan.scans)?;
         errors.iter_mut().for_each(|error| *error += missing);
         if let Some(basis) = &plan.basis {
             add_errors(&mut errors, &basis.errors(&energies, &plan.scans));
@@ -262,6 +267,7 @@ impl<'a> TileEncoder<'a> {
                 entries: chunks.iter().map(chunk_entry).collect(),
                 signal,
                 errors,
+                is_clipped,
             },
             chunks: chunks.into_iter().map(|chunk| chunk.bytes).collect(),
         })
@@ -290,6 +296,7 @@ impl EncodedTileHead {
             entries: vec![ChunkEntry::default(); plan.scans()],
             signal: 0.0,
             errors: vec![0.0; plan.scans()],
+            is_clipped: false,
         }
     }
 
@@ -318,7 +325,8 @@ impl<S: ChunkStore> EncodedFile<S> {
         let tiles = geometry.tile_grid().area();
         let mut scans = plan.scans.clone();
         let mut entries = vec![ChunkEntry::default(); scans.len() * tiles];
-        let (mut signal, mut errors, mut count) = (0.0, vec![0.0; scans.len()], 0);
+        let (mut signal, mut errors) = (0.0, vec![0.0; scans.len()]);
+        let (mut count, mut clipped_tiles) = (0, 0);
         for head in heads {
             assert!(head.is_of(plan) && count < tiles, "a tile of the plan");
             for (scan, entry) in head.entries.iter().enumerate() {
@@ -327,6 +335,7 @@ impl<S: ChunkStore> EncodedFile<S> {
             signal += head.signal;
             add_errors(&mut errors, &head.errors);
             count += 1;
+            clipped_tiles += usize::from(head.is_clipped);
         }
         assert_eq!(count, tiles, "a head for each tile");
         if let Some(basis) = &plan.basis {
@@ -334,6 +343,10 @@ impl<S: ChunkStore> EncodedFile<S> {
         }
         set_snrs(&mut scans, signal, &errors);
         let metadata = MetadataText::encode(metadata)?;
-        Self::indexed(geometry, scans, entries, Vec::new(), metadata, store)
+        let file = Self::indexed(geometry, scans, entries, Vec::new(), metadata, store)?;
+        Ok(Self {
+            clipped_tiles,
+            ..file
+        })
     }
 }
