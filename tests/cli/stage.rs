@@ -301,8 +301,8 @@ fn a_killed_shard_resumes_and_two_at_once_do_no_harm() {
         let sizes = entries.flatten().filter_map(|entry| entry.metadata().ok());
         sizes.map(|metadata| metadata.len()).sum()
     };
-    // The key has some hundred bytes, a tile thousands.
-    while partial_bytes() < 20_000 {
+    // Two whole tiles at least: one has some 120,000 bytes, of which a process that is killed may have written a part.
+    while partial_bytes() < 400_000 {
         assert!(child.try_wait().unwrap().is_none(), "it ended too early");
         std::thread::sleep(Duration::from_millis(1));
     }

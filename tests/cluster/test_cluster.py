@@ -763,7 +763,8 @@ class SlurmTest(WorkflowTest):
         running = RunningShard(folder)
         *_, tiles, _, running.assemble = self.submit_array(running.capture, running.file, 2)
         partial = running.stages / "shards"
-        wait_until(lambda: any(path.stat().st_size > 20_000 for path in partial.glob("1-of-2.*.partial")), SECONDS)
+        # Two whole tiles at least: of one, a process that is killed may have written a part.
+        wait_until(lambda: any(path.stat().st_size > 600_000 for path in partial.glob("1-of-2.*.partial")), SECONDS)
         # Each shard is a job of its own, with a node.
         question = ["squeue", "-h", "-j", f"{tiles}_1", "-o", "%A %N"]
         running.job, running.node = subprocess.run(question, capture_output=True, text=True).stdout.split()
