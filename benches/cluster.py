@@ -9,12 +9,12 @@ its light. It is recovered on one core:
   recover      the peer: one process
   one core     pkg-scripts/cluster --cores 1
 
-and then by pkg-scripts/cluster --cores 2; with --slurm also on a Slurm of two nodes of one core each, which the
-benchmark sets up on this machine, as root, from Debian's packages. All files must have the same bytes. The times of the
-workflow's jobs on one core are the input of a discrete-event simulation of a queue, which starts the jobs of each stage
-on free cores in order. Its prediction for two cores is to be compared with the measurement. For 100 and 1,000 cores,
-and a capture of 16,384 x 16,384 pixels, there is none. Needs Python 3.11, numpy and OpenCV, and a machine that does
-nothing else.
+and then by pkg-scripts/cluster --cores 2; with --slurm also on one node and on two nodes of one core each of a Slurm
+that the benchmark sets up on this machine, as root, from Debian's packages. All files must have the same bytes. The
+times of the workflow's jobs on one core are the input of a discrete-event simulation of a queue, which starts the jobs
+of each stage on free cores in order. Its prediction for two cores is to be compared with the measurement. For 100 and
+1,000 cores, and a capture of 16,384 x 16,384 pixels, there is none. Needs Python 3.11, numpy and OpenCV, and a machine
+that does nothing else.
 """
 
 import argparse
@@ -66,15 +66,20 @@ def main():
         folder = Path(temporary)
         capture = args.capture or repeated_capture(args, folder)
         extent = json.loads((capture / "capture.json").read_text(encoding="utf-8"))["camera"]
-        report = {"shards": args.shards}
+        report, on_slurm = {"shards": args.shards}, {}
+        install_engine(args, capture, folder)
         if args.slurm:
             # First, as it may be unavailable.
             with contextlib.closing(TwoNodeSlurm(folder / "slurm")) as slurm:
                 slurm.start()
-                report["workflow_slurm_s"], on_slurm, _ = run_workflow(args, capture, folder / "on-slurm", 2, SLURM)
+                for nodes in (2, 1):
+                    engine = [*SLURM, "--jobs", str(nodes)]
+                    run = run_workflow(args, capture, folder / f"{nodes}-nodes", 2, engine)
+                    report[f"workflow_slurm_{nodes}_s"], on_slurm[nodes], _ = run
         report["recover_s"], expected = recover(args.program, capture, folder)
-        if args.slurm and on_slurm != expected:
-            sys.exit("the file of Slurm is another than that of recover")
+        for nodes, file in on_slurm.items():
+            if file != expected:
+                sys.exit(f"the file of Slurm with nodes: {nodes} is another than that of recover")
         for cores in (1, 2):
             seconds, file, times = run_workflow(args, capture, folder / f"{cores}-cores", cores)
             if file != expected:
@@ -136,6 +141,12 @@ def recover(program, capture, folder):
     command = ["taskset", "-c", "0", program, "recover", capture, "-o", file]
     seconds = timed(command, os.environ | one_core)
     return seconds, hash_of(file)
+
+
+def install_engine(args, capture, folder):
+    """A dry run, which installs Snakemake if it is missing: no measurement is to have this."""
+    command = [REPO / "pkg-scripts/cluster", capture, "-o", folder / "dry-run", "--cores", "1", "--dry-run"]
+    timed(command, os.environ | {"LTM_EXPORT": str(args.program)})
 
 
 def run_workflow(args, capture, folder, cores, engine=None):
@@ -211,9 +222,10 @@ def print_report(report):
     for cores in (1, 2):
         seconds = report[f"workflow_{cores}_s"]
         print(f"| workflow, cores: {cores} | {seconds:.1f} | {peer / seconds:.2f} |")
-    if "workflow_slurm_s" in report:
-        seconds = report["workflow_slurm_s"]
-        print(f"| workflow on Slurm, two nodes of one core | {seconds:.1f} | {peer / seconds:.2f} |")
+    for nodes in (1, 2):
+        seconds = report.get(f"workflow_slurm_{nodes}_s")
+        if seconds:
+            print(f"| workflow on Slurm, nodes of one core: {nodes} | {seconds:.1f} | {peer / seconds:.2f} |")
     for cores, seconds in report["simulated_s"].items():
         print(f"| simulated, cores: {cores} | {seconds:.1f} | {peer / seconds:.2f} |")
     print(f"\n| {SIMULATED_SIDE} pixels a side, simulated | hours | times as fast as one core |\n|---|---|---|")
