@@ -692,6 +692,16 @@ class FullDiskTest(WorkflowTest):
         filler.unlink()
 
 
+# Ends the first `learn` with a temporary failure.
+FAILS_ONCE = """#!/bin/sh
+if [ "$1 $2" = "stage learn" ] && [ ! -e failed-once ]; then
+  touch failed-once
+  exit 75
+fi
+exec 'PROGRAM' "$@"
+"""
+
+
 class SlurmTest(WorkflowTest):
     """Slurm with two nodes, on this machine."""
 
@@ -712,9 +722,16 @@ class SlurmTest(WorkflowTest):
             simulate(self.captures / f"c{seed}", seed)
         photograph = self.captures / "c3/photos/0005.png"
         photograph.write_bytes(photograph.read_bytes()[:1000])
-        self.workflow(*SNAKEMAKE_OPTIONS, "--group-components", "captures=2")
+        program = write_program(self.folder / "ltm-export", FAILS_ONCE.replace("PROGRAM", PROGRAM))
+        self.workflow(*SNAKEMAKE_OPTIONS, "--group-components", "captures=2", program=program)
         self.assert_recovered("large", "c2", "c4")
         self.assertEqual(self.report()["c3"]["exit_status"], "65")
+        # The job of plan and learn was repeated.
+        self.assertTrue((self.results / "failed-once").exists())
+        # One job has two captures, and the sum of their times; plan and learn have that of one job.
+        jobs = subprocess.run(["scontrol", "show", "job"], check=True, capture_output=True, text=True).stdout
+        limits = re.findall(r"TimeLimit=(\S+)", jobs)
+        self.assertEqual((limits.count("08:00:00"), set(limits)), (1, {"04:00:00", "08:00:00"}))
 
         array = self.folder / "array.ltm"
         self.await_success(self.submit_array(self.captures / "large", array, 3)[-1])

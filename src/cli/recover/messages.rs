@@ -262,8 +262,9 @@ pub fn overexposure(pixels: usize) -> Option<Finding> {
 /// Warns of tiles of the file whose values are clipped; there are `all` tiles.
 pub fn clipped_tiles(tiles: usize, all: usize) -> Option<Finding> {
     let message = format!(
-        "{tiles} of {all} tiles of the file have values far above those of the sample that it is planned from; they are \
-         clipped, so that these pixels are too dark under some lights. With --max-bytes, the file is planned from all tiles"
+        "{tiles} of {all} tiles of the file have values far above those of the sample that it is planned from. They are \
+         clipped, so that parts of these tiles are wrong under some lights. A recovery with --max-bytes plans its file from \
+         all tiles"
     );
     (tiles > 0).then(|| Finding::warning("clipped", message))
 }

@@ -41,9 +41,10 @@ pub fn encode(values: &[f32], step: f32) -> Result<Vec<u8>, FormatError> {
 /// Whether a finite value is larger than a half-precision number of `step` reaches.
 #[cfg(not(target_arch = "wasm32"))]
 pub fn is_clipped(values: &[f32], step: f32) -> bool {
-    let of_steps = |value: &f32| (value / step).abs();
-    let mut all = values.iter().map(of_steps);
-    all.any(|steps| steps.is_finite() && steps > f16::MAX.to_f32())
+    let max = f16::MAX.to_f32();
+    values
+        .iter()
+        .any(|value| value.is_finite() && (value / step).abs() > max)
 }
 
 /// Squared error of [`encode`] on finite values.

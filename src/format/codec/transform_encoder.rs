@@ -181,7 +181,7 @@ impl QuantisedCoefficients {
             .coefficients(extent, rank, &MemoryBudget::unlimited())
     }
 
-    /// Whether a coefficient is larger than the numbers of its last scan reach.
+    /// Whether a coefficient has the largest number of its last scan, which does not reach larger ones.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn is_clipped(&self, scans: &[ProgressiveScan]) -> bool {
         let of_scans = scans.iter().zip(&self.numbers).enumerate();
@@ -439,6 +439,7 @@ mod tests {
         }
     }
 
+    #[cfg(not(target_arch = "wasm32"))]
     #[test]
     fn values_beyond_the_numbers_of_their_last_scan_are_told() {
         let extent = Extent::new(16, 9);

@@ -79,7 +79,8 @@ pub struct EncodedTileHead {
     pub signal: f64,
     /// Squared error after each scan.
     pub errors: Vec<f64>,
-    /// Whether a value is larger than the plan's numbers reach: far above all of the sample.
+    /// Whether a value is larger than the plan's numbers reach: far above all of the sample. Components that the plan leaves
+    /// out do not count.
     pub is_clipped: bool,
 }
 
