@@ -172,7 +172,7 @@ impl<T: FileTiles> LtmWriter<'_, T> {
     }
 
     fn write_within_limit(&mut self) -> Result<WrittenFile> {
-        let _spinner = progress::spinner("compressing");
+        let spinner = progress::spinner("compressing");
         let (levels, destination) = (self.levels, self.input.destination);
         let mut quality = self.quality;
         let max_bytes = match quality {
@@ -186,7 +186,7 @@ impl<T: FileTiles> LtmWriter<'_, T> {
             let file = self.tiles.encode(&self.input, quality);
             let file = file.map_err(|error| self.writing_error(error, max_bytes))?;
             let clipped = messages::clipped_tiles(file.clipped_tiles(), file.index().tiles());
-            self.findings.add(clipped);
+            spinner.suspend(|| self.findings.add(clipped));
             self.findings.check(self.strict)?;
             let output = OutputFile::create(destination.output, &LTM)?;
             let written = output.finish(|out| match levels {

@@ -140,6 +140,7 @@ impl EncodableRuns for CentreOutDirectFunctions {
 /// The direct functions of a tile, quantised scan by scan.
 #[derive(Clone, Debug)]
 pub struct QuantisedDirectFunctions {
+    slots: usize,
     /// `[scan]`, then `[pixel, item, Y Co Cg]`; empty for scans of coefficients.
     numbers: Vec<Vec<i32>>,
     /// Sum of squared values, and of squared errors after each scan.
@@ -187,6 +188,7 @@ impl QuantisedDirectFunctions {
             }
         }
         Self {
+            slots: order.len(),
             numbers,
             errors,
             residual,
@@ -196,8 +198,8 @@ impl QuantisedDirectFunctions {
     /// The functions as a reader decodes them, of the `functions` that were quantised.
     pub fn decoded(&self, functions: &[ColourVector], order: &[u16]) -> Vec<ColourVector> {
         let mut decoded: Vec<ColourVector> = functions.iter().copied().map(finite).collect();
-        let of_pixels = decoded.chunks_exact_mut(order.len());
-        for (function, residual) in of_pixels.zip(self.residual.chunks_exact(order.len())) {
+        let of_pixels = decoded.chunks_exact_mut(self.slots);
+        for (function, residual) in of_pixels.zip(self.residual.chunks_exact(self.slots)) {
             for (&slot, residual) in order.iter().zip(residual) {
                 for (value, residual) in function[usize::from(slot)].iter_mut().zip(residual) {
                     *value -= residual;
@@ -209,15 +211,15 @@ impl QuantisedDirectFunctions {
 
     /// Whether a value is larger than the numbers of its last scan reach.
     #[cfg(not(target_arch = "wasm32"))]
-    pub fn is_clipped(&self, scans: &[ProgressiveScan], slots: usize) -> bool {
-        let mut steps = vec![f32::INFINITY; slots];
+    pub fn is_clipped(&self, scans: &[ProgressiveScan]) -> bool {
+        let mut steps = vec![f32::INFINITY; self.slots];
         for scan in scans.iter().filter(|scan| scan.coding.is_direct()) {
             steps[scan.items()].fill(scan.step);
         }
         // Rounding leaves less than a step, and a number whose sum is restored differs by one.
         let is_large =
             |(error, step): (&ColourVector, &f32)| error.iter().any(|e| e.abs() > 2.0 * step);
-        let mut of_pixels = self.residual.chunks_exact(slots);
+        let mut of_pixels = self.residual.chunks_exact(self.slots);
         of_pixels.any(|errors| errors.iter().zip(&steps).any(is_large))
     }
 

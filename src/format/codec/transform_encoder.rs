@@ -184,17 +184,13 @@ impl QuantisedCoefficients {
     /// Whether a coefficient has the largest number of its last scan, which does not reach larger ones.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn is_clipped(&self, scans: &[ProgressiveScan]) -> bool {
-        let of_scans = scans.iter().zip(&self.numbers).enumerate();
-        let mut of_scans = of_scans.filter(|(_, (scan, _))| !scan.coding.is_direct());
-        of_scans.any(|(s, (scan, numbers))| {
-            let later = |k: usize| {
-                let covers =
-                    |scan: &ProgressiveScan| !scan.coding.is_direct() && scan.items().contains(&k);
-                scans[s + 1..].iter().any(covers)
-            };
-            let components = numbers.chunks_exact(CHANNELS * self.blocks * AREA);
-            let mut last = scan.items().zip(components).filter(|(k, _)| !later(*k));
-            last.any(|(_, numbers)| numbers.iter().any(|n| n.abs() == MAX_MAGNITUDE))
+        let values = CHANNELS * self.blocks * AREA;
+        (0..self.planes.components.len()).any(|k| {
+            last_scan(scans, k).is_some_and(|s| {
+                let at = (k - usize::from(scans[s].first)) * values;
+                let mut numbers = self.numbers[s][at..at + values].iter();
+                numbers.any(|number| number.abs() == MAX_MAGNITUDE)
+            })
         })
     }
 
@@ -207,8 +203,7 @@ impl QuantisedCoefficients {
         scans: &[ProgressiveScan],
         mut decoded: Option<&mut CoefficientPlane>,
     ) {
-        let covers = |scan: &ProgressiveScan| !scan.coding.is_direct() && scan.items().contains(&k);
-        let last = scans.iter().rposition(covers);
+        let last = last_scan(scans, k);
         for a in 0..CHANNELS {
             for (b, (left, top)) in block_corners(extent).enumerate() {
                 let mut residual = transformed(pixels, extent, (left, top), a);
@@ -219,7 +214,7 @@ impl QuantisedCoefficients {
                 let mut error = squared_pixels(&residual, inside);
                 self.errors[0] += error;
                 for (s, scan) in scans.iter().enumerate() {
-                    if covers(scan) {
+                    if covers(scan, k) {
                         let at = (k - usize::from(scan.first)) * CHANNELS + a;
                         let at = (at * self.blocks + b) * AREA;
                         let numbers = &mut self.numbers[s][at..at + AREA];
@@ -288,6 +283,16 @@ impl QuantisedCoefficients {
             content_bytes: main.content_bytes + side.content_bytes,
         })
     }
+}
+
+/// Whether a scan has component `k`.
+fn covers(scan: &ProgressiveScan, k: usize) -> bool {
+    !scan.coding.is_direct() && scan.items().contains(&k)
+}
+
+/// The last scan that has component `k`.
+fn last_scan(scans: &[ProgressiveScan], k: usize) -> Option<usize> {
+    scans.iter().rposition(|scan| covers(scan, k))
 }
 
 /// A block's coefficients in zigzag order.

@@ -141,16 +141,7 @@ impl TileChunks {
         };
         match scans.iter().any(is_lossless) {
             true => encode_halves(tile, rank, order, scans),
-            false => {
-                let quantised = QuantisedTile::new(tile, rank, order, scans, false);
-                let encoded = quantised.encode(scans)?;
-                #[cfg(not(target_arch = "wasm32"))]
-                let encoded = Self {
-                    is_clipped: quantised.is_clipped(scans, order.len()),
-                    ..encoded
-                };
-                Ok(encoded)
-            }
+            false => QuantisedTile::new(tile, rank, order, scans, false).encode(scans),
         }
     }
 }
@@ -197,12 +188,12 @@ impl QuantisedTile {
         }
     }
 
-    /// Whether a value is larger than the numbers of its last scan reach; `slots` are those of a window.
+    /// Whether a value is larger than the numbers of its last scan reach.
     #[cfg(not(target_arch = "wasm32"))]
-    fn is_clipped(&self, scans: &[ProgressiveScan], slots: usize) -> bool {
+    fn is_clipped(&self, scans: &[ProgressiveScan]) -> bool {
         let (coefficients, functions) = (self.coefficients.as_ref(), self.functions.as_ref());
         coefficients.is_some_and(|q| q.is_clipped(scans))
-            || functions.is_some_and(|q| q.is_clipped(scans, slots))
+            || functions.is_some_and(|q| q.is_clipped(scans))
     }
 
     fn encode(&self, scans: &[ProgressiveScan]) -> Result<TileChunks, FormatError> {
@@ -222,7 +213,7 @@ impl QuantisedTile {
             chunks,
             errors: errors.collect(),
             #[cfg(not(target_arch = "wasm32"))]
-            is_clipped: false,
+            is_clipped: self.is_clipped(scans),
         })
     }
 }
