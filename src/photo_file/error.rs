@@ -1,5 +1,7 @@
 //! Errors of photograph files. The caller adds the file.
 
+use std::io;
+
 use thiserror::Error;
 
 use super::decode::PhotoFormat;
@@ -9,7 +11,10 @@ use super::decode::PhotoFormat;
 pub enum PhotoFileError {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]
-    Io(#[from] std::io::Error),
+    Io(#[source] io::Error),
+    /// The file ends before its picture does.
+    #[error("is cut off; copy the whole file again")]
+    CutOff,
     /// The bytes begin like none of the formats.
     #[error("cannot be decoded: it is no PNG, TIFF or OpenEXR picture")]
     UnknownFormat,
@@ -38,4 +43,13 @@ pub enum PhotoFileError {
     /// The pixels of an OpenEXR picture are not those that it shows.
     #[error("has a data window that differs from its display window; export the whole picture")]
     DataWindow,
+}
+
+impl From<io::Error> for PhotoFileError {
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::UnexpectedEof => Self::CutOff,
+            _ => Self::Io(error),
+        }
+    }
 }

@@ -123,9 +123,9 @@ fn check_header(header: &Header, max_bytes: u64) -> Result<(), PhotoFileError> {
 
 fn decoding_error(error: Error) -> PhotoFileError {
     match error {
-        Error::Io(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => {
-            PhotoFileError::Io(error)
-        }
+        Error::Io(error) => error.into(),
+        // What the decoder makes of an unexpected end.
+        Error::Invalid(reason) if reason == "reference to missing bytes" => PhotoFileError::CutOff,
         error => undecodable(error.to_string()),
     }
 }

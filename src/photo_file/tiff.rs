@@ -81,9 +81,7 @@ fn values(buffer: DecodingResult) -> Result<SampleValues, PhotoFileError> {
 
 fn decoding_error(error: TiffError, max_bytes: u64) -> PhotoFileError {
     match error {
-        TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => {
-            PhotoFileError::Io(error)
-        }
+        TiffError::IoError(error) => error.into(),
         TiffError::LimitsExceeded => PhotoFileError::TooLarge { max_bytes },
         error => undecodable(error.to_string()),
     }

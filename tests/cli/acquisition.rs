@@ -173,6 +173,10 @@ fn wrong_input_is_named_with_its_remedy() {
         "{message}"
     );
     assert!(message.contains("--response srgb"), "{message}");
+    let content = fs::read(&photo).unwrap();
+    fs::write(&photo, &content[..content.len() / 2]).unwrap();
+    let message = session.refusal();
+    assert!(message.contains("IMG_0004.png: is cut off"), "{message}");
     fs::write(&photo, "text").unwrap();
     assert!(
         session

@@ -345,7 +345,18 @@ fn openexr(light: &[[f64; 3]], is_half: bool) -> Vec<u8> {
 
 #[test]
 fn floating_point_photographs_keep_their_noise_below_black() {
-    let (session, _) = session_of(float_photo);
+    let (session, files) = session_of(float_photo);
+    for (i, name) in [(1, "IMG_0001.tif"), (3, "IMG_0003.exr")] {
+        let content = fs::read(&files[i]).unwrap();
+        fs::write(&files[i], &content[..content.len() / 2]).unwrap();
+        let message = refusal(&assemble(&session, &[]));
+        assert!(
+            message.contains(&format!("{name}: is cut off")),
+            "{message}"
+        );
+        assert_untouched(&session);
+        fs::write(&files[i], content).unwrap();
+    }
     let output = assemble(&session, &["--white", "4"]);
     assert!(output.status.success(), "{}", stderr_text(&output));
     assert!(
