@@ -89,7 +89,7 @@ impl Job {
         self.stages.join("shards").join(name)
     }
 
-    pub fn plan(&self, options: &[&str]) {
+    pub fn plan(&self, options: &[&str]) -> Output {
         let args = [
             "stage",
             "plan",
@@ -97,7 +97,7 @@ impl Job {
             "-o",
             text(&self.stages),
         ];
-        succeeds(&[&args[..], self.options, options].concat());
+        succeeds(&[&args[..], self.options, options].concat())
     }
 
     pub fn learn(&self) -> Output {
@@ -396,6 +396,8 @@ fn files_of_other_stages_are_checked_and_named() {
     ];
     let learn = ["stage", "learn", stages];
     fails(&learn, 75, &["plan.json: is missing", "stage plan"]);
+    let of_capture = ["stage", "learn", text(&job.capture)];
+    fails(&of_capture, 65, &["is a capture", "stage plan"]);
     job.plan(&[]);
     let (first, second) = (job.tiles_args("1/2"), job.tiles_args("2/2"));
     fails(&first, 75, &["learned.bin: is missing", "stage learn"]);
@@ -497,6 +499,10 @@ fn files_of_other_stages_are_checked_and_named() {
 fn strict_plans_write_no_file_after_a_warning() {
     let job = Job::new("64x128", &["--fault", "clip=0.4"], &NNLS);
     job.plan(&["--strict"]);
+    assert!(job.plan(&["--strict"]).stderr.is_empty());
     fails(&["stage", "learn", text(&job.stages)], 65, &["--strict"]);
     assert!(!job.stages.join("learned.bin").exists());
+    let note = stderr_text(&job.plan(&[]));
+    let words = ["plan.json: replaced the plan of ", text(&job.capture)];
+    assert!(words.iter().all(|word| note.contains(word)), "{note}");
 }

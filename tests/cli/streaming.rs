@@ -91,6 +91,22 @@ fn with_little_memory_photographs_are_read_in_strips_to_the_same_file() {
     assert_eq!(whole.1["photograph_table"], strips.1["photograph_table"]);
     assert!(whole.0 == strips.0);
     assert_eq!(recover("lots").1.status.code(), Some(2));
+    // So are those of its stages.
+    let [stages, file] = ["stages", "stages.ltm"].map(|name| folder.path().join(name));
+    let stage = |args: &[&str]| {
+        let output = command(&[&["stage"], args].concat()).output().unwrap();
+        assert!(output.status.success(), "{}", stderr_text(&output));
+    };
+    let (stages, memory) = (text(&stages), ["--memory", least]);
+    let options = ["--window", "3", "--method", "nnls"];
+    stage(&[&["plan", text(&capture), "-o", stages], &options[..]].concat());
+    stage(&[&["learn", stages], &memory[..]].concat());
+    for shard in ["2/2", "1/2"] {
+        stage(&[&["tiles", stages, "--shard", shard], &memory[..]].concat());
+    }
+    let assemble = ["assemble", stages, "--shards", "2", "-o", text(&file)];
+    stage(&[&assemble[..], &memory].concat());
+    assert!(fs::read(file).unwrap() == whole.0);
 }
 
 /// The capture that every [`Interruptible`] has a copy of.

@@ -265,8 +265,15 @@ fn plan(args: &PlanArgs, cores: &InterruptibleCores) -> Result<()> {
     let inputs = RecoveryInputs::new(&capture, &args.options)?;
     let stages = StageFolder::create(&args.output)?;
     let plan = RecoveryPlan::new(&inputs, cores)?;
-    plan.write(&stages)?;
+    let replaced = plan.write(&stages)?;
     let (path, rows) = (stages.plan(), inputs.file_tile_rows());
+    if let Some(earlier) = replaced {
+        eprintln!(
+            "note: {}: replaced the plan of {}, which has other options or photographs; what its stages wrote stays until they run again",
+            path.display(),
+            earlier.capture.display(),
+        );
+    }
     print_line(&format!(
         "{}: {} files of {}, to recover in at most {rows} shards",
         path.display(),

@@ -72,20 +72,22 @@ impl RecoveryPlan {
         self.files.len()
     }
 
-    /// Writes the plan, unless an equal one is there.
+    /// Writes the plan, unless an equal one is there. Returns the one that it replaces.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn write(&self, stages: &StageFolder) -> Result<()> {
-        if Self::read(stages).is_ok_and(|plan| plan == *self) {
-            return Ok(());
+    pub fn write(&self, stages: &StageFolder) -> Result<Option<Self>> {
+        let earlier = Self::read(stages).ok();
+        if earlier.as_ref() == Some(self) {
+            return Ok(None);
         }
         let output = OutputFile::create(&stages.plan(), &PLAN)?;
         output.finish(|out| {
             serde_json::to_writer_pretty(&mut *out, self)?;
             Ok(writeln!(out)?)
         })?;
-        Ok(())
+        // Another path of the same photographs is no other recovery.
+        Ok(earlier.filter(|earlier| earlier.id != self.id))
     }
 
     /// # Errors
@@ -100,6 +102,7 @@ impl RecoveryPlan {
             stages.plan(),
             "\"ltm-export stage plan CAPTURE -o FOLDER\"".to_owned(),
         );
+        stages.check_is_no_capture(&remedy)?;
         let text = stages.read(&path, &remedy)?;
         let damaged = || StageFileProblem::Damaged(remedy.clone()).of(&path);
         let ProgramOnly { program } = serde_json::from_slice(&text).map_err(|_| damaged())?;

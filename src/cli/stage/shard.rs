@@ -22,8 +22,11 @@ pub struct Shard {
 impl Shard {
     /// Parses `3/16`.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let hint =
-            || format!("give the number of a shard and of all, as in 3/16; at most {MAX_SHARDS}");
+        let hint = || {
+            format!(
+                "give the number of a shard, from 1, and of all shards, {MAX_SHARDS} at most, as in 3/16"
+            )
+        };
         let (number, count) = text.split_once('/').ok_or_else(hint)?;
         let [number, count] = [number, count].map(|text| text.parse::<u32>().map_err(|_| hint()));
         let shard = Self {

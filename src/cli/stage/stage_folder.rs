@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Error, Result};
 
 use super::shard::Shard;
+use crate::capture::MANIFEST_NAME;
 use crate::cli::recover::checkpoint_key::PROGRAM;
 
 /// A file of another stage that is missing, damaged or of other photographs.
@@ -24,6 +25,8 @@ pub enum StageFileProblem {
         "is missing, and there are packs of {found} shards: give that number, or {remedy} writes it"
     )]
     OtherCount { found: u32, remedy: String },
+    #[error("is a capture, without a plan; give the folder that {0} writes")]
+    IsCapture(String),
     #[error("is incomplete or damaged; {0} writes it again")]
     Damaged(String),
     #[error("is not of this {made_from}; {remedy} writes it again")]
@@ -37,7 +40,9 @@ pub enum StageFileProblem {
     ChangedWhileRead,
     #[error("was written by {0}, and this is {PROGRAM}; use one version for all stages")]
     OtherProgram(String),
-    #[error("{0} has changed since; \"ltm-export stage plan\" plans the recovery anew")]
+    #[error(
+        "{0} has changed since; bring the file back, or plan the recovery anew by \"ltm-export stage plan\""
+    )]
     ChangedCapture(String),
 }
 
@@ -89,6 +94,15 @@ impl StageFolder {
             )
         })?;
         Ok(folder)
+    }
+
+    /// If it is a capture folder: then no stage has written the plan that is missing.
+    pub fn check_is_no_capture(&self, remedy: &str) -> Result<(), StageFileError> {
+        let is_capture = self.0.join(MANIFEST_NAME).exists() && !self.plan().exists();
+        match is_capture {
+            true => Err(StageFileProblem::IsCapture(remedy.to_owned()).of(&self.0)),
+            false => Ok(()),
+        }
     }
 
     pub fn plan(&self) -> PathBuf {
