@@ -28,9 +28,9 @@ SECONDS = 300
 THREE_ROWS = "128x384"
 
 sys.path.insert(0, str(REPO / "workflow/scripts"))
-from captures import Capture, CollectionError, read_collection  # noqa: E402
+from captures import Capture, CollectionError, folders_without_captures, read_collection  # noqa: E402
 from engine_timing import bound_status_interval  # noqa: E402
-from write_page import page  # noqa: E402
+from write_page import failures, page  # noqa: E402
 
 
 def ltm_export(*args):
@@ -260,13 +260,16 @@ class ShardsTest(WorkflowTest):
         whole = self.folder / "whole"
         ltm_export("stage", "plan", self.captures / "killed", "-o", whole, *OPTIONS.split())
         ltm_export("stage", "learn", whole)
-        ltm_export("stage", "tiles", whole, "--shard", "1/3")
-        half = (whole / "shards/1-of-3.pack").stat().st_size // 2
+        _, written = bytes_read_and_written([PROGRAM, "stage", "tiles", whole, "--shard", "1/3"])
+        # Recovered tiles, which are larger than the coded ones of the pack.
+        half = (written - (whole / "shards/1-of-3.pack").stat().st_size) // 2
         killer = KILLER.replace("PROGRAM", PROGRAM).replace("HALF", str(half))
         program = write_program(self.folder / "killer", killer)
         self.workflow("--cores", "1", program=program)
         logs = "".join(path.read_text(encoding="utf-8") for path in self.results.glob("logs/killed/*.log"))
-        self.assertRegex(logs, r"resuming with [1-9]\d* of")
+        kept, tiles = map(int, re.search(r"resuming with (\d+) of (\d+) tiles", logs).groups())
+        # One more may have ended since.
+        self.assertIn(kept, range(tiles // 2 - 1, tiles))
         self.assert_recovered("killed")
 
     def test_a_shard_reads_its_rows_and_little_more(self):
@@ -409,6 +412,10 @@ class EngineTest(WorkflowTest):
             self.assertEqual(self.states(), ["recovered"] * 3)
             self.assertEqual(list(self.results.glob("logs/*/*.temporary.json")), [])
 
+        with self.subTest("after a change of options all runs again"):
+            self.config = (f"options={OPTIONS} --quality 20",)
+            self.assertEqual(self.run_with(), everything)
+
 
 class LauncherTest(WorkflowTest):
     """pkg-scripts/cluster before Snakemake has captures."""
@@ -429,6 +436,15 @@ class LauncherTest(WorkflowTest):
         self.assertIn("its file system has no locks (flock ended with status 71)", without)
         self.assertIn("holds no capture", without)
 
+    def test_a_wrong_field_of_the_configuration_is_named(self):
+        for setting, message in (
+            ("thread=2", "Additional properties are not allowed ('thread' was unexpected); docs/cluster.md"),
+            ("threads=two", "threads: 'two' is not of type 'integer'; docs/cluster.md"),
+        ):
+            said = self.start(71, "--config", f"captures={self.captures}", setting)
+            self.assertIn(f"configuration: {message}", said)
+            self.assertNotIn("Failed validating", said)
+
 
 class ArrayTest(unittest.TestCase):
     """array.sbatch, with a command in place of sbatch."""
@@ -444,13 +460,17 @@ class ArrayTest(unittest.TestCase):
         for file, content in (("sbatch", sbatch), ("it's", program)):
             write_program(folder / file, content)
         environment = {"PATH": f"{folder}:{os.environ['PATH']}", "LTM_EXPORT": str(folder / "it's")}
-        environment |= {"SLURM_CPUS_PER_TASK": "3", "SLURM_ARRAY_TASK_ID": "2", "OPTIONS": "--window 7"}
-        command = [REPO / "workflow/array.sbatch", folder / name, folder / f"{name}.ltm", "4"]
-        subprocess.run(command, env=environment, check=True, capture_output=True, timeout=60)
+        environment |= {"SLURM_CPUS_PER_TASK": "3", "SLURM_ARRAY_TASK_ID": "2", "OPTIONS": "--window 7", "MEMORY": "2G"}
+        command = [REPO / "workflow/array.sbatch", folder / name, folder / f"{name}.ltm"]
+        for shards in ("0", "257", "1/4"):
+            refused = subprocess.run([*command, shards], env=environment, capture_output=True, text=True, timeout=60)
+            self.assertEqual((refused.returncode, (folder / "calls").exists()), (2, False))
+            self.assertIn(f"from 1 to 256, not {shards}", refused.stderr)
+        subprocess.run([*command, "4"], env=environment, check=True, capture_output=True, timeout=60)
         stages = f"{folder.resolve()}/{name}-stages"
-        calls = f"3|stage|plan|{folder.resolve()}/{name}|--window|7|-o|{stages}|3|stage|learn|{stages}|"
-        calls += f"3|stage|tiles|{stages}|--shard|2/4|3|stage|levels|{stages}|--shard|2/4|"
-        calls += f"3|stage|assemble|{stages}|--shards|4|-o|{folder.resolve()}/{name}.ltm|"
+        calls = f"3|stage|plan|{folder.resolve()}/{name}|--window|7|-o|{stages}|3|stage|learn|--memory|2G|{stages}|"
+        calls += f"3|stage|tiles|{stages}|--memory|2G|--shard|2/4|3|stage|levels|{stages}|--memory|2G|--shard|2/4|"
+        calls += f"3|stage|assemble|{stages}|--memory|2G|--shards|4|-o|{folder.resolve()}/{name}.ltm|"
         self.assertEqual((folder / "calls").read_text(encoding="utf-8"), calls)
 
 
@@ -464,7 +484,7 @@ class DriverTest(unittest.TestCase):
         files = ["--result", folder / "result.json", "--log", folder / "x.log"]
         command = [sys.executable, REPO / "workflow/scripts/run_command.py", "--name", "x", *files, *options]
         command += ["--", "sh", "-c", script]
-        return subprocess.run(list(map(str, command)), timeout=60).returncode, folder
+        return subprocess.run(list(map(str, command)), stderr=subprocess.DEVNULL, timeout=60).returncode, folder
 
     def test_permanent_failures_are_results(self):
         for status in (1, 2, 65):
@@ -488,6 +508,17 @@ class DriverTest(unittest.TestCase):
         ended, folder = self.run_script(f"test ! -e '{checkpoint}'", "--checkpoint", checkpoint)
         result = json.loads((folder / "result.json").read_text())
         self.assertEqual((ended, result["status"]), (0, "done"))
+
+    def test_a_program_that_cannot_be_run_is_named(self):
+        folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
+        self.addCleanup(shutil.rmtree, folder)
+        command = [sys.executable, REPO / "workflow/scripts/run_command.py", "--name", "x", "--log", folder / "x.log"]
+        command += ["--result", folder / "result.json", "--", folder / "missing", "recover"]
+        ended = subprocess.run(list(map(str, command)), stderr=subprocess.PIPE, text=True, timeout=60)
+        self.assertEqual(ended.returncode, 75)
+        message = rf"{folder}/missing: cannot be run on .+: No such file or directory; put it at the same path"
+        self.assertRegex(json.loads((folder / "x.temporary.json").read_text())["error"], message)
+        self.assertRegex(ended.stderr, f"x: {message}")
 
     def test_temporary_failures_fail_the_job(self):
         cases = {
@@ -524,6 +555,8 @@ class CollectionFileTest(unittest.TestCase):
         path = self.folder / "list.csv"
         cases = {
             "name,folder\na,b\n": "the first line must name the columns",
+            "name;capture\na;b\n": "not 'name;capture'; separate them by commas",
+            "name,capture,options\na,b,--memory=2G\n": "line 2: options: --memory=2G: the workflow gives this option",
             "name,capture\n": "names no capture",
             "name,capture\n../a,b\n": "line 2: name: '../a'",
             "name,capture\na,b\na,c\n": "line 3: name: a is there twice",
@@ -538,6 +571,14 @@ class CollectionFileTest(unittest.TestCase):
             path.write_bytes(text if isinstance(text, bytes) else text.encode())
             with self.assertRaisesRegex(CollectionError, re.escape(message)):
                 read_collection(path)
+
+    def test_folders_without_captures_are_named(self):
+        for name in ("a", "b", ".hidden"):
+            (self.folder / name).mkdir()
+        (self.folder / "a/capture.json").touch()
+        (self.folder / "notes.txt").touch()
+        self.assertEqual(folders_without_captures(self.folder), ["b"])
+        self.assertEqual(folders_without_captures(self.folder / "a"), [])
 
     def test_names_are_composed_as_on_linux_and_macos(self):
         decomposed = self.folder / "Fu\u0308ssen"
@@ -603,6 +644,12 @@ class PageTest(unittest.TestCase):
         self.assertRegex(html, r"<main>(?s:.)*<caption(?s:.)*</main>")
         self.assertEqual(html.count('aria-sort="ascending"'), 1)
 
+    def test_the_end_of_a_run_names_ten_failures(self):
+        results = [{"name": f"c{i}", "status": "failed", "error": "a.png: is cut off\nmore"} for i in range(12)]
+        results[0] |= {"status": "recovered", "error": None}
+        lines = failures(results)
+        self.assertEqual((lines[0], lines[-1], len(lines)), ("  c1: a.png: is cut off", "  and 1 more", 11))
+
 
 class OtherSlurmTest(unittest.TestCase):
     """A machine that belongs to a real cluster."""
@@ -646,41 +693,53 @@ class OtherSlurmTest(unittest.TestCase):
 class FullDiskTest(WorkflowTest):
     """A disk without space: a small file system in memory."""
 
-    def test_a_stage_succeeds_once_there_is_space(self):
-        capture = self.captures / "large"
-        simulate(capture, 1, "256x256")
-        self.results.mkdir()
+    def setUp(self):
+        self.results.mkdir(exist_ok=True)
         mount = ["mount", "-t", "tmpfs", "-o", "size=100m", "tmpfs", str(self.results)]
         if subprocess.run(mount, capture_output=True).returncode != 0:
             if os.environ.get("CI"):
                 self.fail("a small file system cannot be mounted")
             self.skipTest("a small file system cannot be mounted")
         self.addCleanup(subprocess.run, ["umount", str(self.results)])
+
+    def test_a_run_continues_once_there_is_space(self):
+        simulate(self.captures / "small", 2)
+        program = write_program(self.folder / "ltm-export", FILLS_DISK.replace("PROGRAM", PROGRAM))
+        environment = os.environ | {"LTM_EXPORT": str(program)}
+        ended = subprocess.run(self.command(), env=environment, capture_output=True, text=True, timeout=SECONDS)
+        self.assertEqual(ended.returncode, 1)
+        self.assertRegex(ended.stderr, r"(?m)^small: .*(No space left on device|no space is left)")
+        (self.results / "filler").unlink()
+        self.assertEqual(self.workflow(), ["small: recover"])
+        self.assert_recovered("small")
+
+    def test_a_stage_succeeds_once_there_is_space(self):
+        capture = self.captures / "large"
+        simulate(capture, 1, "256x256")
         stages, file = self.results / "stages", self.results / "large.ltm"
         copy, recovered = self.results / "copy", self.folder / "recovered.ltm"
         ltm_export("recover", capture, "-o", recovered, *OPTIONS.split())
-        for command in (
-            ["ingest", capture, "-o", copy],
-            ["plan", copy, "-o", stages, *OPTIONS.split()],
-            ["learn", stages],
-            ["tiles", stages, "--shard", "1/1"],
-            ["levels", stages, "--shard", "1/1"],
-            ["assemble", stages, "--shards", "1", "-o", file],
-        ):
-            self.fails_without_space(["stage", *command])
-            ltm_export("stage", *command)
-        self.assertEqual(file.read_bytes(), recovered.read_bytes())
-        # The disk is full when half of a shard, or of a file, is written.
-        pack = stages / "shards/1-of-1.pack"
         for command, again, output in (
-            (["stage", "tiles", stages, "--shard", "1/1"], [], pack),
+            (["stage", "ingest", capture, "-o", copy], [], copy / "photos/0005.tif"),
+            (["stage", "plan", copy, "-o", stages, *OPTIONS.split()], [], stages / "plan.json"),
+            (["stage", "learn", stages], [], stages / "learned.bin"),
+            (["stage", "tiles", stages, "--shard", "1/1"], [], stages / "shards/1-of-1.pack"),
+            (["stage", "levels", stages, "--shard", "1/1"], [], stages / "shards/1-of-1.levels"),
+            (["stage", "assemble", stages, "--shards", "1", "-o", file], [], file),
             (["recover", capture, "-o", file, *OPTIONS.split()], ["--resume"], file),
         ):
-            expected = output.read_bytes()
-            output.unlink()
-            self.fails_without_space(command, spare=len(expected) // 2)
-            ltm_export(*command, *again)
-            self.assertEqual(output.read_bytes(), expected)
+            with self.subTest(output.name):
+                file.unlink(missing_ok=True)
+                self.fails_without_space(command)
+                _, written = bytes_read_and_written([PROGRAM, *command])
+                expected = output.read_bytes()
+                shutil.rmtree(copy) if output.is_relative_to(copy) else output.unlink()
+                # The disk is full when half of all that it writes is written.
+                self.fails_without_space(command, spare=written // 2)
+                ltm_export(*command, *again)
+                self.assertEqual(output.read_bytes(), expected)
+                if output == file:
+                    self.assertEqual(expected, recovered.read_bytes())
 
     def fails_without_space(self, command, spare=0):
         """Runs a command while so many bytes are free, or less than a page: folders take none."""
@@ -690,6 +749,13 @@ class FullDiskTest(WorkflowTest):
         self.assertEqual(ended.returncode, 75, f"{command}: {ended.stderr}")
         self.assertIn("No space left on device", ended.stderr)
         filler.unlink()
+
+
+# Fills the disk before it recovers.
+FILLS_DISK = """#!/bin/sh
+[ "$1" != recover ] || cat /dev/zero >>filler 2>/dev/null
+exec 'PROGRAM' "$@"
+"""
 
 
 # Ends the first `learn` with a temporary failure.
@@ -786,6 +852,23 @@ class SlurmTest(WorkflowTest):
         question = ["squeue", "-h", "-j", f"{tiles}_1", "-o", "%A %N"]
         running.job, running.node = subprocess.run(question, capture_output=True, text=True).stdout.split()
         return running
+
+
+class GigapixelTest(unittest.TestCase):
+    """A picture of 32,768 x 32,768 pixels."""
+
+    def test_assemble_needs_less_than_100_mb(self):
+        with tempfile.TemporaryDirectory(prefix="gigapixel-test-") as folder:
+            report = Path(folder) / "report.json"
+            bench = [REPO / "pkg-scripts/bench", "gigapixel", "--report", report]
+            bench += ["--side", "0", "--tiles", "65536", "--patterns", "16"]
+            environment = os.environ | {"LTM_EXPORT": PROGRAM}
+            ended = subprocess.run(bench, env=environment, capture_output=True, text=True, timeout=2 * SECONDS)
+            self.assertEqual(ended.returncode, 0, ended.stderr[-3000:])
+            figures = json.loads(report.read_text(encoding="utf-8"))["assemble"]
+        # Two bytes for each tile at least, so that the file has them all.
+        self.assertGreater(figures["file_bytes"], 2 * 65536)
+        self.assertLess(figures["memory_bytes"], 100e6)
 
 
 class RunningShard:

@@ -17,6 +17,7 @@ MANIFEST = "capture.json"
 # jobs on Slurm by commas.
 NAME = re.compile(r"\w[\w .+=@-]*")
 CSV_COLUMNS = {"name", "capture", "options"}
+OPTIONS_OF_WORKFLOW = {"--memory", "--json", "--resume", "-o", "--output"}
 
 
 class CollectionError(Exception):
@@ -93,6 +94,15 @@ def _read_folder(folder):
     return list(captures.values())
 
 
+def folders_without_captures(path):
+    """Names of the folders in a folder of capture folders that have no capture.json."""
+    path = Path(path)
+    if not path.is_dir() or (path / MANIFEST).exists():
+        return []
+    folders = [child for child in path.iterdir() if child.is_dir() and not child.name.startswith(".")]
+    return sorted(folder.name for folder in folders if not (folder / MANIFEST).exists())
+
+
 def _capture_of_folder(folder):
     """The capture of a folder, with the folder's name."""
     name = normal_name(folder.name)
@@ -136,7 +146,10 @@ def _text(path):
 def _check_columns(path, columns):
     """Checks the first line of a CSV file."""
     if not {"name", "capture"} <= set(columns or []) <= CSV_COLUMNS:
-        raise CollectionError(f"{path}: the first line must name the columns name and capture, and optionally options")
+        found = ",".join(columns or [])
+        remedy = "; separate them by commas" if ";" in found else ""
+        columns = "the columns name and capture, and optionally options"
+        raise CollectionError(f"{path}: the first line must name {columns}, not {found!r}{remedy}")
 
 
 def _capture_of_row(path, line, row):
@@ -163,9 +176,14 @@ def normal_name(name):
 def split_options(place, options):
     """Splits options as a shell does. An error names the place."""
     try:
-        return shlex.split(options)
+        parts = shlex.split(options)
     except ValueError as error:
         raise CollectionError(f"{place}: {error}; correct the quotes") from error
+    for part in parts:
+        if part.split("=")[0] in OPTIONS_OF_WORKFLOW:
+            remedy = "set memory_mb instead" if part.startswith("--memory") else "leave it out"
+            raise CollectionError(f"{place}: {part}: the workflow gives this option; {remedy}")
+    return parts
 
 
 def _strings(value):

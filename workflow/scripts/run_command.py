@@ -15,25 +15,40 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from socket import gethostname
 
 FAILURE = 1
 PERMANENT = (FAILURE, 2, 65)
 TEMPORARY = 75
 # Snakemake repeats a failed job at once.
 SECONDS_UNTIL_RETRY = 5
+# With less, a log may lack its last message.
+MIN_FREE_BYTES = 1 << 20
 # The last message of a log, which may have several lines.
 ERROR = re.compile(r"(?s:.*)^error: ((?s:.*))", re.MULTILINE)
 
 
 def main():
-    """Runs the command, unless an earlier one of the same capture failed."""
+    """Runs the job. A file that cannot be written, as on a full disk, is a temporary failure."""
     args = parse_arguments()
+    try:
+        return run_job(args)
+    except OSError as error:
+        print(f"{args.name}: {error}", file=sys.stderr)
+        time.sleep(SECONDS_UNTIL_RETRY)
+        return TEMPORARY
+
+
+def run_job(args):
+    """Runs the command, unless an earlier one of the same capture failed. Returns the exit status of the job."""
     temporary = args.log.with_suffix(".temporary.json")
     temporary.unlink(missing_ok=True)
     earlier = [read_json(path) for path in args.after]
     failed = next((result for result in earlier if result["status"] == "failed"), None)
     result, output = (failed, "") if failed else run_command(args)
     if result["status"] == "unfinished":
+        # For the log of the engine: the disk that fails the command may have no space for the result either.
+        print(f"{args.name}: {result['error']}", file=sys.stderr)
         write_json(temporary, result)
         if result["exit_status"] == TEMPORARY:
             time.sleep(SECONDS_UNTIL_RETRY)
@@ -90,7 +105,12 @@ def run(command, log):
     # Ctrl-C reaches the command as well, which then ends in order.
     signal.signal(signal.SIGINT, lambda *_: None)
     with open(log, "w", encoding="utf-8") as errors:
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
+        try:
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
+        except OSError as error:
+            remedy = "put it at the same path on all nodes"
+            errors.write(f"error: {command[0]}: cannot be run on {gethostname()}: {error.strerror}; {remedy}\n")
+            return TEMPORARY, ""
         signal.signal(signal.SIGTERM, lambda *_: process.terminate())
         while True:
             try:
@@ -108,6 +128,8 @@ def reason(status, log):
     message = ERROR.match(log.read_text(encoding="utf-8", errors="replace"))
     if message:
         return message[1].strip()[:2000]
+    if status == TEMPORARY and shutil.disk_usage(log.parent).free < MIN_FREE_BYTES:
+        return f"no space is left on the disk of {log.parent.absolute()}"
     return f"ended with exit status {status} and without an error message; see {log}"
 
 

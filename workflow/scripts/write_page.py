@@ -13,6 +13,8 @@ from captures import read_collection
 
 PAGE = Path(__file__).resolve().parent.parent / "page"
 CSV_COLUMNS = ["name", "status", "exit_status", "error", "snr_db", "bytes", "seconds", "warnings", "capture"]
+# Printed at the end of a run; report.csv has all.
+MAX_FAILURES = 10
 STATUSES = ["recovered", "failed", "unfinished"]
 HEADS = ["Photograph", "Status", "SNR (dB)", "Size (kB)", "Time (s)", "Warnings", "Message"]
 
@@ -96,6 +98,14 @@ def summary(results):
     """How many captures ended in which way."""
     counts = [sum(result["status"] == status for result in results) for status in STATUSES]
     return ", ".join(f"{count} {status}" for count, status in zip(counts, STATUSES, strict=True))
+
+
+def failures(results):
+    """The captures that were not recovered, one a line, with the first lines of their errors; ten at most."""
+    failed = [result for result in results if result["status"] != "recovered"]
+    errors = [(result["name"], (result["error"] or "").partition("\n")[0]) for result in failed[:MAX_FAILURES]]
+    lines = [f"  {name}: {error}" for name, error in errors]
+    return lines + ([f"  and {len(failed) - MAX_FAILURES} more"] if len(failed) > MAX_FAILURES else [])
 
 
 def page(results):
