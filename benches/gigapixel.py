@@ -199,7 +199,7 @@ def measure_assemble(args, small, folder):
         copy_pack(first, stages / "shards" / f"{i + 1}-of-{shards}.pack", i)
     out = folder / "assembled.ltm"
     figures = measured([*stage, "assemble", stages, "--shards", str(shards), "-o", out])
-    subprocess.run([args.program, "verify", out], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([args.program, "inspect", out], check=True, stdout=subprocess.DEVNULL)
     return figures | {"file_bytes": out.stat().st_size}
 
 
