@@ -200,6 +200,8 @@ def measure_assemble(args, small, folder):
     out = folder / "assembled.ltm"
     figures = measured([*stage, "assemble", stages, "--shards", str(shards), "-o", out])
     subprocess.run([args.program, "inspect", out], check=True, stdout=subprocess.DEVNULL)
+    packs = (stages / "shards").glob("*.pack")
+    assert out.stat().st_size > 0.9 * sum(pack.stat().st_size for pack in packs), "it lacks tiles"
     return figures | {"file_bytes": out.stat().st_size}
 
 

@@ -11,10 +11,7 @@ use super::decode::PhotoFormat;
 pub enum PhotoFileError {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]
-    Io(#[source] io::Error),
-    /// The file ends before its picture does.
-    #[error("is cut off; copy the whole file again")]
-    CutOff,
+    Io(#[from] io::Error),
     /// The bytes begin like none of the formats.
     #[error("cannot be decoded: it is no PNG, TIFF or OpenEXR picture")]
     UnknownFormat,
@@ -45,11 +42,18 @@ pub enum PhotoFileError {
     DataWindow,
 }
 
-impl From<io::Error> for PhotoFileError {
-    fn from(error: io::Error) -> Self {
+impl PhotoFileError {
+    /// The error of a decoder that reads: the file ends too early, or cannot be read.
+    pub(super) fn of_reading(format: PhotoFormat, error: io::Error) -> Self {
         match error.kind() {
-            io::ErrorKind::UnexpectedEof => Self::CutOff,
+            io::ErrorKind::UnexpectedEof => Self::incomplete(format),
             _ => Self::Io(error),
         }
+    }
+
+    /// Data are missing: at the end of the file, or where it says that they are.
+    pub(super) fn incomplete(format: PhotoFormat) -> Self {
+        let reason = "it is cut off or damaged; copy or export it again".to_owned();
+        Self::Undecodable { format, reason }
     }
 }

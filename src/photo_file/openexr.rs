@@ -98,7 +98,7 @@ impl Pixels {
     /// Refuses a file that ends before its last block.
     fn finish(self, channels: usize) -> Result<PhotoSamples, PhotoFileError> {
         if self.decoded != self.size.area() {
-            return Err(undecodable("it is not whole".to_owned()));
+            return Err(PhotoFileError::incomplete(PhotoFormat::OpenExr));
         }
         let side = |side| u32::try_from(side).unwrap_or(u32::MAX);
         let extent = Extent::new(side(self.size.width()), side(self.size.height()));
@@ -123,9 +123,11 @@ fn check_header(header: &Header, max_bytes: u64) -> Result<(), PhotoFileError> {
 
 fn decoding_error(error: Error) -> PhotoFileError {
     match error {
-        Error::Io(error) => error.into(),
+        Error::Io(error) => PhotoFileError::of_reading(PhotoFormat::OpenExr, error),
         // What the decoder makes of an unexpected end.
-        Error::Invalid(reason) if reason == "reference to missing bytes" => PhotoFileError::CutOff,
+        Error::Invalid(reason) if reason == "reference to missing bytes" => {
+            PhotoFileError::incomplete(PhotoFormat::OpenExr)
+        }
         error => undecodable(error.to_string()),
     }
 }

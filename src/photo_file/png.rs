@@ -18,7 +18,7 @@ pub(super) fn decode(
     limits.max_alloc = Some(max_bytes);
     reader.limits(limits);
     let image = reader.decode().map_err(|error| match error {
-        ImageError::IoError(error) => error.into(),
+        ImageError::IoError(error) => PhotoFileError::of_reading(PhotoFormat::Png, error),
         ImageError::Limits(_) => PhotoFileError::TooLarge { max_bytes },
         error => undecodable(error.to_string()),
     })?;

@@ -81,7 +81,7 @@ fn values(buffer: DecodingResult) -> Result<SampleValues, PhotoFileError> {
 
 fn decoding_error(error: TiffError, max_bytes: u64) -> PhotoFileError {
     match error {
-        TiffError::IoError(error) => error.into(),
+        TiffError::IoError(error) => PhotoFileError::of_reading(PhotoFormat::Tiff, error),
         TiffError::LimitsExceeded => PhotoFileError::TooLarge { max_bytes },
         error => undecodable(error.to_string()),
     }

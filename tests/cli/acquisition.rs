@@ -176,7 +176,10 @@ fn wrong_input_is_named_with_its_remedy() {
     let content = fs::read(&photo).unwrap();
     fs::write(&photo, &content[..content.len() / 2]).unwrap();
     let message = session.refusal();
-    assert!(message.contains("IMG_0004.png: is cut off"), "{message}");
+    assert!(
+        message.contains("IMG_0004.png: cannot be decoded as PNG: it is cut off or damaged; copy"),
+        "{message}"
+    );
     fs::write(&photo, "text").unwrap();
     assert!(
         session

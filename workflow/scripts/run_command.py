@@ -22,7 +22,7 @@ PERMANENT = (FAILURE, 2, 65)
 TEMPORARY = 75
 # Snakemake repeats a failed job at once.
 SECONDS_UNTIL_RETRY = 5
-# With less, a log may lack its last message.
+# With less, a log may lack its last message; a program that cannot print it may even end with another status.
 MIN_FREE_BYTES = 1 << 20
 # The last message of a log, which may have several lines.
 ERROR = re.compile(r"(?s:.*)^error: ((?s:.*))", re.MULTILINE)
@@ -108,8 +108,8 @@ def run(command, log):
         try:
             process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
         except OSError as error:
-            remedy = "put it at the same path on all nodes"
-            errors.write(f"error: {command[0]}: cannot be run on {gethostname()}: {error.strerror}; {remedy}\n")
+            remedy = "; put it at the same path on all machines" if isinstance(error, FileNotFoundError) else ""
+            errors.write(f"error: {command[0]}: cannot be run on {gethostname()}: {error.strerror}{remedy}\n")
             return TEMPORARY, ""
         signal.signal(signal.SIGTERM, lambda *_: process.terminate())
         while True:
@@ -128,7 +128,7 @@ def reason(status, log):
     message = ERROR.match(log.read_text(encoding="utf-8", errors="replace"))
     if message:
         return message[1].strip()[:2000]
-    if status == TEMPORARY and shutil.disk_usage(log.parent).free < MIN_FREE_BYTES:
+    if shutil.disk_usage(log.parent).free < MIN_FREE_BYTES:
         return f"no space is left on the disk of {log.parent.absolute()}"
     return f"ended with exit status {status} and without an error message; see {log}"
 

@@ -19,15 +19,18 @@ STATUSES = ["recovered", "failed", "unfinished"]
 HEADS = ["Photograph", "Status", "SNR (dB)", "Size (kB)", "Time (s)", "Warnings", "Message"]
 
 
-def write_page(captures, folder):
-    """Writes the results of captures in a folder. Returns them."""
+def read_results(captures, folder):
+    """How the recoveries of captures ended, as rows of the table."""
+    return [read_result(capture, Path(folder)) for capture in captures]
+
+
+def write_page(results, folder):
+    """Writes the page and the table into a folder."""
     folder = Path(folder)
-    results = [read_result(capture, folder) for capture in captures]
     write_text(folder / "report.csv", report(results))
     write_text(folder / "index.html", page(results))
     for name in ("page.css", "table.js"):
         shutil.copyfile(PAGE / name, folder / name)
-    return results
 
 
 def read_result(capture, folder):
@@ -192,4 +195,4 @@ def write_text(path, text):
 
 
 if __name__ == "__main__":
-    write_page(read_collection(sys.argv[1]), sys.argv[2])
+    write_page(read_results(read_collection(sys.argv[1]), sys.argv[2]), sys.argv[2])

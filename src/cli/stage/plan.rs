@@ -72,7 +72,8 @@ impl RecoveryPlan {
         self.files.len()
     }
 
-    /// Writes the plan, unless an equal one is there. Returns the one that it replaces.
+    /// Writes the plan, unless an equal one is there. Returns the plan of another recovery that it replaces, unless that one
+    /// is damaged or of another version.
     ///
     /// # Errors
     /// If it cannot be written.
