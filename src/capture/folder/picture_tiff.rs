@@ -220,7 +220,7 @@ fn unreadable<F: CaptureFiles>(file: &PictureFile<'_, F>, error: TiffError) -> C
         // The disk or the network is at fault, not the file.
         TiffError::IoError(e) if e.raw_os_error().is_some() => file.io_error(e),
         TiffError::IoError(e) if e.kind() == io::ErrorKind::UnexpectedEof => {
-            file.unreadable("TIFF", "it is cut off")
+            file.unreadable("TIFF", "it is cut off or damaged")
         }
         error => file.unreadable("TIFF", error),
     }
