@@ -1,6 +1,6 @@
 """Measures the stages whose work or memory must not grow with the picture: plan, learn and assemble.
 
-python3 gigapixel.py [--side 16384] [--patterns 80] [--tiles 65536] [--report FILE.json]
+python3 gigapixel.py [--program ltm-export] [--side 16384] [--patterns 80] [--tiles 65536] [--report FILE.json]
 
 A capture of 1,024 x 1,024 pixels and 128 x 128 light elements is simulated and repeated along both axes. Its
 photographs are TIFFs as `ltm-export stage ingest` writes them, but tiles that repeat are in the file once only.
@@ -10,7 +10,7 @@ photographs are TIFFs as `ltm-export stage ingest` writes them, but tiles that r
                 and the others have its tiles
 
 For each stage: seconds, the largest resident memory, and the bytes of all reads, from the page cache as well.
-LTM_EXPORT names the program. Needs Linux, Python 3.11, numpy, OpenCV, crc32c, zstandard, and 4 GB of disk space.
+Needs Linux, Python 3.11, numpy, OpenCV, crc32c, zstandard, and 4 GB of disk space.
 """
 
 import argparse
@@ -69,6 +69,8 @@ def main():
 def parse_arguments():
     """The arguments."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    program = os.environ.get("LTM_EXPORT", REPO / "target/release/ltm-export")
+    parser.add_argument("--program", default=program, type=Path)
     parser.add_argument("--side", type=int, default=16384, help="pixels, a multiple of 1,024; 0 for none")
     parser.add_argument("--patterns", type=int, default=80)
     parser.add_argument(
@@ -76,7 +78,6 @@ def parse_arguments():
     )
     parser.add_argument("--report", type=Path, help="JSON file to write")
     args = parser.parse_args()
-    args.program = os.environ.get("LTM_EXPORT", REPO / "target/release/ltm-export")
     if args.side % SMALL_SIDE or args.tiles != (math.isqrt(args.tiles) // 8 * 8) ** 2:
         parser.error("--side is no multiple of 1,024, or --tiles not the square of a multiple of 8")
     return args

@@ -479,12 +479,17 @@ class DriverTest(unittest.TestCase):
 
     def run_script(self, script, *options):
         """Runs a shell script as a job. Returns the job's exit status and the folder with its files."""
+        ended, folder = self.run_job(["sh", "-c", script], *options)
+        return ended.returncode, folder
+
+    def run_job(self, program, *options):
+        """Runs a program as a job. Returns how the job ended and the folder with its files."""
         folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
         self.addCleanup(shutil.rmtree, folder)
         files = ["--result", folder / "result.json", "--log", folder / "x.log"]
         command = [sys.executable, REPO / "workflow/scripts/run_command.py", "--name", "x", *files, *options]
-        command += ["--", "sh", "-c", script]
-        return subprocess.run(list(map(str, command)), stderr=subprocess.DEVNULL, timeout=60).returncode, folder
+        command += ["--", *program]
+        return subprocess.run(list(map(str, command)), stderr=subprocess.PIPE, text=True, timeout=60), folder
 
     def test_permanent_failures_are_results(self):
         for status in (1, 2, 65):
@@ -510,13 +515,9 @@ class DriverTest(unittest.TestCase):
         self.assertEqual((ended, result["status"]), (0, "done"))
 
     def test_a_program_that_cannot_be_run_is_named(self):
-        folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
-        self.addCleanup(shutil.rmtree, folder)
-        command = [sys.executable, REPO / "workflow/scripts/run_command.py", "--name", "x", "--log", folder / "x.log"]
-        command += ["--result", folder / "result.json", "--", folder / "missing", "recover"]
-        ended = subprocess.run(list(map(str, command)), stderr=subprocess.PIPE, text=True, timeout=60)
+        ended, folder = self.run_job(["/missing/ltm-export", "recover"])
         self.assertEqual(ended.returncode, 75)
-        message = rf"{folder}/missing: cannot be run on .+: No such file or directory; put it at the same path"
+        message = r"/missing/ltm-export: cannot be run on .+: No such file or directory; put it at the same path"
         self.assertRegex(json.loads((folder / "x.temporary.json").read_text())["error"], message)
         self.assertRegex(ended.stderr, f"x: {message}")
 
@@ -690,6 +691,22 @@ class OtherSlurmTest(unittest.TestCase):
         self.assertFalse(self.configuration.exists())
 
 
+class GigapixelTest(unittest.TestCase):
+    """A picture of 32,768 x 32,768 pixels."""
+
+    def test_assemble_needs_less_than_100_mb(self):
+        with tempfile.TemporaryDirectory(prefix="gigapixel-test-") as folder:
+            report = Path(folder) / "report.json"
+            bench = [REPO / "pkg-scripts/bench", "gigapixel", "--report", report]
+            bench += ["--side", "0", "--tiles", "65536", "--patterns", "16"]
+            environment = os.environ | {"LTM_EXPORT": PROGRAM}
+            command = ["timeout", "-k", "5", str(4 * SECONDS), *bench]
+            ended = subprocess.run(command, env=environment, capture_output=True, text=True)
+            self.assertEqual(ended.returncode, 0, ended.stderr[-3000:])
+            figures = json.loads(report.read_text(encoding="utf-8"))["assemble"]
+        self.assertLess(figures["memory_bytes"], 100e6)
+
+
 class FullDiskTest(WorkflowTest):
     """A disk without space: a small file system in memory."""
 
@@ -852,22 +869,6 @@ class SlurmTest(WorkflowTest):
         question = ["squeue", "-h", "-j", f"{tiles}_1", "-o", "%A %N"]
         running.job, running.node = subprocess.run(question, capture_output=True, text=True).stdout.split()
         return running
-
-
-class GigapixelTest(unittest.TestCase):
-    """A picture of 32,768 x 32,768 pixels."""
-
-    def test_assemble_needs_less_than_100_mb(self):
-        with tempfile.TemporaryDirectory(prefix="gigapixel-test-") as folder:
-            report = Path(folder) / "report.json"
-            bench = [REPO / "pkg-scripts/bench", "gigapixel", "--report", report]
-            bench += ["--side", "0", "--tiles", "65536", "--patterns", "16"]
-            environment = os.environ | {"LTM_EXPORT": PROGRAM}
-            command = ["timeout", "-k", "5", str(4 * SECONDS), *bench]
-            ended = subprocess.run(command, env=environment, capture_output=True, text=True)
-            self.assertEqual(ended.returncode, 0, ended.stderr[-3000:])
-            figures = json.loads(report.read_text(encoding="utf-8"))["assemble"]
-        self.assertLess(figures["memory_bytes"], 100e6)
 
 
 class RunningShard:
