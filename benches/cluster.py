@@ -10,11 +10,11 @@ its light. It is recovered on one core:
   one core     pkg-scripts/cluster --cores 1
 
 and then by pkg-scripts/cluster --cores 2; with --slurm also on one node and on two nodes of one core each of a Slurm
-that the benchmark sets up on this machine, as root, from Debian's packages. All files must have the same bytes. The
-times of the workflow's jobs on one core are the input of a discrete-event simulation of a queue, which starts the jobs
-of each stage on free cores in order. Its prediction for two cores is to be compared with the measurement. For 100 and
-1,000 cores, and a capture of 16,384 x 16,384 pixels, there is none. Needs Python 3.11, numpy and OpenCV, and a machine
-that does nothing else.
+that the benchmark sets up on this machine, as root, from Debian's packages: in one allocation, and with a job of Slurm
+for each job of the workflow. All files must have the same bytes. The times of the workflow's jobs on one core are the
+input of a discrete-event simulation of a queue, which starts the jobs of each stage on free cores in order. Its
+prediction for two cores is to be compared with the measurement. For 100 and 1,000 cores, and a capture of
+16,384 x 16,384 pixels, there is none. Needs Python 3.11, numpy and OpenCV, and a machine that does nothing else.
 """
 
 import argparse
@@ -27,6 +27,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -34,10 +35,12 @@ import numpy
 
 REPO = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(REPO / "tests/cluster"))
-from two_node_slurm import SNAKEMAKE_OPTIONS, TwoNodeSlurm  # noqa: E402
+from two_node_slurm import SNAKEMAKE_OPTIONS, TwoNodeSlurm, run_in_allocation  # noqa: E402
 
-# Its nodes have 4 GB.
-SLURM = [*SNAKEMAKE_OPTIONS, "--config", "memory_mb=3000"]
+# Its nodes have 4 GB, and a job requests a quarter more than this.
+SLURM_CONFIG = ["--config", "memory_mb=3000"]
+# For a command that hangs.
+MAX_SECONDS = 4 * 3600
 # Stages in the order in which they run; the jobs of one run side by side.
 STAGES = ("ingest", "plan", "learn", "tiles", "levels", "assemble")
 # Those that are divided into as many jobs as there are shards.
@@ -73,15 +76,20 @@ def main():
             with contextlib.closing(TwoNodeSlurm(folder / "slurm")) as slurm:
                 slurm.start()
                 for nodes in (2, 1):
-                    engine = [*SLURM, "--jobs", str(nodes)]
-                    run = run_workflow(args, capture, folder / f"{nodes}-nodes", 2, engine)
-                    report[f"workflow_slurm_{nodes}_s"], on_slurm[nodes], _ = run
+                    for name, start, options in (
+                        ("allocation", partial(timed_on_nodes, nodes), SLURM_CONFIG),
+                        ("jobs", timed, [*SNAKEMAKE_OPTIONS, "--jobs", str(nodes), *SLURM_CONFIG]),
+                    ):
+                        run = run_workflow(args, capture, folder / f"{nodes}-{name}", options, start)
+                        report[f"workflow_{name}_{nodes}_s"], on_slurm[name, nodes], _ = run
         report["recover_s"], expected = recover(args.program, capture, folder)
-        for nodes, file in on_slurm.items():
+        for (name, nodes), file in on_slurm.items():
             if file != expected:
-                sys.exit(f"the file of Slurm with nodes: {nodes} is another than that of recover")
+                sys.exit(f"the file of Slurm ({name}) with nodes: {nodes} is another than that of recover")
         for cores in (1, 2):
-            seconds, file, times = run_workflow(args, capture, folder / f"{cores}-cores", cores)
+            start = partial(timed, pin=["taskset", "-c", "0"] if cores == 1 else [])
+            options = ["--cores", str(cores)]
+            seconds, file, times = run_workflow(args, capture, folder / f"{cores}-cores", options, start)
             if file != expected:
                 sys.exit(f"the file of {cores} cores is another than that of recover")
             report[f"workflow_{cores}_s"] = seconds
@@ -138,8 +146,8 @@ def recover(program, capture, folder):
     """The seconds of a recovery on one core, and the hash of the file."""
     file = folder / "recovered.ltm"
     one_core = {"RAYON_NUM_THREADS": "1"}
-    command = ["taskset", "-c", "0", program, "recover", capture, "-o", file]
-    seconds = timed(command, os.environ | one_core)
+    command = [program, "recover", capture, "-o", file]
+    seconds = timed(command, os.environ | one_core, ["taskset", "-c", "0"])
     return seconds, hash_of(file)
 
 
@@ -149,10 +157,10 @@ def install_engine(args, capture, folder):
     timed(command, os.environ | {"LTM_EXPORT": str(args.program)})
 
 
-def run_workflow(args, capture, folder, cores, engine=None):
+def run_workflow(args, capture, folder, options, start):
     """The seconds of the workflow, the hash of the file, and the seconds of its jobs by stage.
 
-    Without options for another `engine`, it runs on this machine.
+    `start` runs a command with an environment, and returns the seconds.
     """
     captures, results = folder / "captures", folder / "results"
     captures.mkdir(parents=True)
@@ -160,10 +168,9 @@ def run_workflow(args, capture, folder, cores, engine=None):
     recorder, times = folder / "ltm-export", folder / "times"
     recorder.write_text(RECORDER.format(program=args.program.resolve(), times=times), encoding="utf-8")
     recorder.chmod(0o755)
-    command = [REPO / "pkg-scripts/cluster", captures, "-o", results, *(engine or ["--cores", str(cores)])]
+    command = [REPO / "pkg-scripts/cluster", captures, "-o", results, *options]
     command += ["--config", "shard_pixels=1", f"shards={args.shards}"]
-    pin = ["taskset", "-c", "0"] if cores == 1 else []
-    seconds = timed([*pin, *command], os.environ | {"LTM_EXPORT": str(recorder)})
+    seconds = start(command, os.environ | {"LTM_EXPORT": str(recorder)})
     durations = {stage: [] for stage in STAGES}
     for line in times.read_text(encoding="utf-8").splitlines():
         stage, began, ended = line.split()
@@ -172,13 +179,25 @@ def run_workflow(args, capture, folder, cores, engine=None):
     return seconds, hash_of(results / "large.ltm"), durations
 
 
-def timed(command, environment):
-    """Runs a command. Returns the seconds that it took."""
+def timed(command, environment, pin=()):
+    """Runs a command, with one in front that chooses the core. Returns the seconds that it took."""
     began = time.monotonic()
-    ended = subprocess.run(list(map(str, command)), env=environment, capture_output=True, text=True)
+    ended = subprocess.run(list(map(str, [*pin, *command])), env=environment, capture_output=True, text=True)
     if ended.returncode != 0:
         sys.exit(f"{command}: {ended.stderr[-2000:]}")
     return time.monotonic() - began
+
+
+def timed_on_nodes(nodes, command, environment):
+    """Runs a command in an allocation of so many nodes. Returns the seconds until its end."""
+    with tempfile.TemporaryDirectory(prefix="cluster-bench-job-") as folder:
+        log = Path(folder) / "log"
+        began = time.monotonic()
+        status = run_in_allocation(command, nodes, log, MAX_SECONDS, environment)
+        seconds = time.monotonic() - began
+        if status != 0:
+            sys.exit(f"{command}: {log.read_text(encoding='utf-8')[-2000:]}")
+    return seconds
 
 
 def hash_of(path):
@@ -222,10 +241,11 @@ def print_report(report):
     for cores in (1, 2):
         seconds = report[f"workflow_{cores}_s"]
         print(f"| workflow, cores: {cores} | {seconds:.1f} | {peer / seconds:.2f} |")
-    for nodes in (1, 2):
-        seconds = report.get(f"workflow_slurm_{nodes}_s")
-        if seconds:
-            print(f"| workflow on Slurm, nodes of one core: {nodes} | {seconds:.1f} | {peer / seconds:.2f} |")
+    for name in ("allocation", "jobs"):
+        for nodes in (1, 2):
+            seconds = report.get(f"workflow_{name}_{nodes}_s")
+            if seconds:
+                print(f"| workflow on Slurm ({name}), nodes: {nodes} | {seconds:.1f} | {peer / seconds:.2f} |")
     for cores, seconds in report["simulated_s"].items():
         print(f"| simulated, cores: {cores} | {seconds:.1f} | {peer / seconds:.2f} |")
     print(f"\n| {SIMULATED_SIDE} pixels a side, simulated | hours | times as fast as one core |\n|---|---|---|")

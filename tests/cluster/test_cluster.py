@@ -17,7 +17,7 @@ from pathlib import Path
 from unittest import mock
 
 import two_node_slurm
-from two_node_slurm import SNAKEMAKE_OPTIONS, SlurmUnavailable, TwoNodeSlurm, wait_until
+from two_node_slurm import SNAKEMAKE_OPTIONS, SlurmUnavailable, TwoNodeSlurm, run_in_allocation, wait_until
 
 REPO = Path(__file__).resolve().parents[2]
 PROGRAM = os.path.abspath(os.environ.get("LTM_EXPORT", REPO / "target/release/ltm-export"))
@@ -482,14 +482,15 @@ class DriverTest(unittest.TestCase):
         ended, folder = self.run_job(["sh", "-c", script], *options)
         return ended.returncode, folder
 
-    def run_job(self, program, *options):
+    def run_job(self, program, *options, environment=None):
         """Runs a program as a job. Returns how the job ended and the folder with its files."""
         folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
         self.addCleanup(shutil.rmtree, folder)
         files = ["--result", folder / "result.json", "--log", folder / "x.log"]
         command = [sys.executable, REPO / "workflow/scripts/run_command.py", "--name", "x", *files, *options]
         command += ["--", *program]
-        return subprocess.run(list(map(str, command)), stderr=subprocess.PIPE, text=True, timeout=60), folder
+        job = {"env": environment, "stderr": subprocess.PIPE, "text": True, "timeout": 60}
+        return subprocess.run(list(map(str, command)), **job), folder
 
     def test_permanent_failures_are_results(self):
         for status in (1, 2, 65):
@@ -536,6 +537,42 @@ class DriverTest(unittest.TestCase):
             result = json.loads((folder / "x.temporary.json").read_text())
             self.assertEqual(result["exit_status"], status)
             self.assertTrue(result["error"].startswith(error), result["error"])
+
+    def test_a_step_of_an_allocation_ends_as_its_command(self):
+        folder = Path(tempfile.mkdtemp(prefix="cluster-test-"))
+        self.addCleanup(shutil.rmtree, folder)
+        write_program(folder / "srun", SRUN)
+        environment = os.environ | {"PATH": f"{folder}:{os.environ['PATH']}", "SLURM_JOB_NUM_NODES": "2"}
+        environment |= {"CALLS": str(folder / "calls"), "SLURM_MEM_PER_CPU": "100"}
+        cases = {
+            "echo 'error: x.png: is cut off' >&2; exit 65": ("failed", 65, "x.png: is cut off"),
+            "echo 'error: disk full' >&2; exit 75": ("unfinished", 75, "disk full"),
+            "exit 137": ("unfinished", -9, "ended by signal 9; is memory_mb too low[?]"),
+            # srun's own failure.
+            "exit 1": ("unfinished", 75, "n1: task 0: Exited with exit code 1; see .*"),
+            "exit 0": ("done", 0, "None"),
+        }
+        for script, expected in cases.items():
+            job = ["sh", "-c", script]
+            _, files = self.run_job(job, "--cores", "3", "--memory-mb", "500", environment=environment)
+            (path,) = files.glob("*.json")
+            result = json.loads(path.read_text())
+            self.assertEqual((result["status"], result["exit_status"]), expected[:2])
+            self.assertRegex(str(result["error"]), f"^{expected[2]}$")
+            called = (folder / "calls").read_text(encoding="utf-8").splitlines()[-1]
+            self.assertRegex(called, "--nodes=1 --ntasks=1 --exact --cpus-per-task=3 --mem=500M .*sh -c")
+
+
+# Stands for Slurm's program: runs the command, and says how it failed.
+SRUN = """#!/bin/sh
+echo "$*" >>"$CALLS"
+[ -z "$SLURM_MEM_PER_CPU" ] || exit 77
+while [ "$1" != sh ]; do shift; done
+"$@"
+status=$?
+[ $status = 0 ] || echo "srun: error: n1: task 0: Exited with exit code $status" >&2
+exit $status
+"""
 
 
 class CollectionFileTest(unittest.TestCase):
@@ -785,6 +822,13 @@ exec 'PROGRAM' "$@"
 """
 
 
+# Writes on which node each stage runs.
+NODE_RECORDER = """#!/bin/sh
+[ "$1" != stage ] || echo "$SLURMD_NODENAME $2" >>nodes
+exec 'PROGRAM' "$@"
+"""
+
+
 class SlurmTest(WorkflowTest):
     """Slurm with two nodes, on this machine."""
 
@@ -819,6 +863,26 @@ class SlurmTest(WorkflowTest):
         array = self.folder / "array.ltm"
         self.await_success(self.submit_array(self.captures / "large", array, 3)[-1])
         self.assertEqual(array.read_bytes(), (self.results / "large.ltm").read_bytes())
+
+    def test_an_allocation_of_two_nodes(self):
+        """Jobs of the workflow run on both nodes; a capture at fault fails by its error."""
+        self.captures, self.results = self.folder / "allocation-captures", self.folder / "allocation-results"
+        self.captures.mkdir()
+        simulate(self.captures / "allocated", 5, THREE_ROWS)
+        simulate(self.captures / "at fault", 6)
+        photograph = self.captures / "at fault/photos/0005.png"
+        photograph.write_bytes(photograph.read_bytes()[:1000])
+        program = write_program(self.folder / "node-recorder", NODE_RECORDER.replace("PROGRAM", PROGRAM))
+        log = self.folder / "allocation.log"
+        status = run_in_allocation(self.command(), 2, log, SECONDS, os.environ | {"LTM_EXPORT": str(program)})
+        self.assertEqual(status, 0, log.read_text(encoding="utf-8")[-6000:])
+        self.assert_recovered("allocated")
+        failed = self.report()["at fault"]
+        self.assertEqual(failed["exit_status"], "65")
+        self.assertIn("photos/0005.png", failed["error"])
+        self.assertNotIn("srun", failed["error"])
+        steps = [line.split() for line in (self.results / "nodes").read_text(encoding="utf-8").splitlines()]
+        self.assertEqual({node for node, stage in steps if stage == "tiles"}, {"n1", "n2"})
 
     def test_a_lost_node(self):
         """Its daemon, the job's daemon and the job are killed: the shard continues on the other node."""

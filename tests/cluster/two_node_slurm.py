@@ -4,6 +4,7 @@ Its daemons are real, from Debian's packages, without containers.
 """
 
 import os
+import shlex
 import shutil
 import signal
 import socket
@@ -124,6 +125,19 @@ class TwoNodeSlurm:
     def _is_configured(self):
         """Whether the machine's configuration is the one that this object wrote, with its own folder."""
         return self.settings is not None and CONF.exists() and CONF.read_text(encoding="utf-8") == self.settings
+
+
+def run_in_allocation(command, nodes, log, seconds, env=None):
+    """Runs a command as one job of so many nodes, and waits for its end. Returns its exit status.
+
+    `sbatch --wait` would ask for the end every half a minute only.
+    """
+    ended = Path(f"{log}.status")
+    script = f"{shlex.join(map(str, command))}; echo $? >{shlex.quote(str(ended))}"
+    request = [f"--nodes={nodes}", "--ntasks-per-node=1", "--mem=3900", f"--output={log}"]
+    run(["sbatch", *request, "--wrap", script], env=env)
+    wait_until(lambda: ended.exists() and ended.read_text(encoding="utf-8").endswith("\n"), seconds)
+    return int(ended.read_text(encoding="utf-8"))
 
 
 def nodes_that_are(state):

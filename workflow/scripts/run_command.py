@@ -3,6 +3,8 @@
 A permanent failure (exit status 1, 2 or 65) is a result as well: the job succeeds, so that Snakemake neither repeats it
 nor stops for it. Any other failure (75, a panic, an interruption, a signal) fails the job, so that Snakemake repeats
 it; then the JSON is beside the log.
+
+In a Slurm allocation of several nodes, srun runs the command on a node that has free cores.
 """
 
 import argparse
@@ -26,6 +28,11 @@ SECONDS_UNTIL_RETRY = 5
 MIN_FREE_BYTES = 1 << 20
 # The last message of a log, which may have several lines.
 ERROR = re.compile(r"(?s:.*)^error: ((?s:.*))", re.MULTILINE)
+# What srun adds to the log, and its last error.
+OF_SRUN = re.compile(r"^(?:srun|slurmstepd): .*\n?", re.MULTILINE)
+ERROR_OF_SRUN = re.compile(r"(?s:.*)^srun: error: (.*)", re.MULTILINE)
+# A shell and srun add the number of a signal to it.
+SIGNAL = 128
 
 
 def main():
@@ -67,11 +74,11 @@ def run_command(args):
     """Runs the command, again without its checkpoint if need be. Returns how it ended, and its standard output."""
     started = time.monotonic()
     resumes = args.checkpoint and args.checkpoint.exists()
-    status, output = run(args.command, args.log)
+    status, output = run(args)
     if status == FAILURE and resumes:
         # The checkpoint is of other options or photographs, or of another build of the program.
         args.checkpoint.unlink(missing_ok=True)
-        status, output = run(args.command, args.log)
+        status, output = run(args)
     result = {
         "name": args.name,
         "status": "done" if status == 0 else "failed" if status in PERMANENT else "unfinished",
@@ -92,12 +99,38 @@ def parse_arguments():
     parser.add_argument("--file", type=Path, help="the .ltm file that this command writes")
     parser.add_argument("--checkpoint", type=Path, help="file from which the command resumes, if it can")
     parser.add_argument("--remove", type=Path, help="folder to remove after success")
+    parser.add_argument("--cores", type=int, default=1, help="cores that a step of Slurm requests")
+    parser.add_argument("--memory-mb", type=int, help="memory that a step of Slurm requests, in megabytes")
     parser.add_argument("command", nargs="+")
     return parser.parse_args()
 
 
-def run(command, log):
-    """Runs the command. Returns its exit status, and what it printed on standard output.
+def run(args):
+    """Runs the command. Returns its exit status, and what it printed on standard output."""
+    if int(os.environ.get("SLURM_JOB_NUM_NODES", "1")) == 1:
+        return run_process(args.command, args.log, os.environ)
+    srun = ["srun", "--nodes=1", "--ntasks=1", "--exact", f"--cpus-per-task={args.cores}"]
+    srun += [f"--mem={args.memory_mb}M"] if args.memory_mb else []
+    # Ctrl-C ends the command at once.
+    srun += ["--input=none", "--disable-status"]
+    # The allocation's memory, which may be given in a way that excludes --mem.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("SLURM_MEM_PER_")}
+    status, output = run_process([*srun, *args.command], args.log, environment)
+    return status_of_step(status, args.log), output
+
+
+def status_of_step(status, log):
+    """The exit status of the command that srun ran, from that of srun; a signal is negative, as of a process.
+
+    srun ends with the same statuses if the step cannot be started: then the command printed no error.
+    """
+    if status > SIGNAL:
+        return SIGNAL - status
+    return TEMPORARY if status in PERMANENT and not ERROR.match(read_log(log)) else status
+
+
+def run_process(command, log, environment):
+    """Runs a command. Returns its exit status, and what it printed on standard output.
 
     If the process that started this one is killed, the command is interrupted: nothing would wait for its end.
     """
@@ -106,7 +139,7 @@ def run(command, log):
     signal.signal(signal.SIGINT, lambda *_: None)
     with open(log, "w", encoding="utf-8") as errors:
         try:
-            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
+            process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True, env=environment)
         except OSError as error:
             remedy = "; put it at the same path on all machines" if isinstance(error, FileNotFoundError) else ""
             errors.write(f"error: {command[0]}: cannot be run on {gethostname()}: {error.strerror}{remedy}\n")
@@ -125,12 +158,20 @@ def reason(status, log):
     """Why a command failed: its last error message, or how it ended without one."""
     if status < 0:
         return f"ended by signal {-status}" + ("; is memory_mb too low?" if -status == signal.SIGKILL else "")
-    message = ERROR.match(log.read_text(encoding="utf-8", errors="replace"))
+    message = ERROR.match(OF_SRUN.sub("", read_log(log)))
     if message:
         return message[1].strip()[:2000]
+    message = ERROR_OF_SRUN.match(read_log(log))
+    if message:
+        return f"{message[1]}; see {log}"
     if shutil.disk_usage(log.parent).free < MIN_FREE_BYTES:
         return f"no space is left on the disk of {log.parent.absolute()}"
     return f"ended with exit status {status} and without an error message; see {log}"
+
+
+def read_log(log):
+    """What the command printed on standard error."""
+    return log.read_text(encoding="utf-8", errors="replace")
 
 
 def finish_capture(args, result, output):
